@@ -1,0 +1,26 @@
+// Provides: what is counted on the device during a step, and the sizes of its dispatches.
+
+struct Counters {
+    // Rays generated for this step; the last kernel of the step writes the next number.
+    rays: u32,
+    // Leading rays whose samples fit the budget: the M of the loss.
+    rays_used: u32,
+    // Marched samples of those rays, and the number all rays asked for.
+    samples: u32,
+    samples_wanted: u32,
+    // Samples kept for colour and backward, and the number all used rays asked for.
+    kept: u32,
+    kept_wanted: u32,
+    // Sums since the host last cleared them.
+    sum_steps: u32,
+    sum_rays: u32,
+    sum_samples: u32,
+    sum_kept: u32,
+    // Of the loss (mean over rays and channels) and of the colour's squared error (mean over 3 channels).
+    sum_loss: f32,
+    sum_color_error: f32,
+}
+
+fn workgroups(count: u32, per_group: u32) -> vec3<u32> {
+    return vec3(max((count + per_group - 1u) / per_group, 1u), 1u, 1u);
+}

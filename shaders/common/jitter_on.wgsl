@@ -1,0 +1,1 @@
+const JITTER = true;

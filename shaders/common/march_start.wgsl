@@ -1,0 +1,10 @@
+// Needs: random, step, ray, stepping. Provides: march_start.
+
+// Where the first sample of a ray lies, in steps: one random offset for the whole ray while training, and
+// half a step when JITTER is off.
+fn march_start(ray: Ray, index: u32) -> f32 {
+    if JITTER {
+        return stepping_index(ray.t_near) + random_f32(step.stream, index, RANDOM_OFFSET);
+    }
+    return stepping_index(ray.t_near) + 0.5;
+}

@@ -1,0 +1,40 @@
+// Ends a step: sums the errors of its rays and chooses the number of rays of the next one, so that the kept
+// samples meet their target and the marched ones fit. One workgroup. Needs: counters.
+
+var<storage, read_write> counters: Counters;
+var<storage, read_write> dispatch: array<vec3<u32>>;
+var<storage, read> ray_errors: array<vec4<f32>>;
+var<workgroup> sums: array<vec4<f32>, 64>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(local_invocation_index) thread: u32) {
+    let rays = counters.rays_used;
+    var sum = vec4(0.0);
+    for (var i = thread; i < rays; i += 64u) {
+        sum += ray_errors[i];
+    }
+    sums[thread] = sum;
+    workgroupBarrier();
+    if thread != 0u {
+        return;
+    }
+    var total = vec4(0.0);
+    for (var i = 0u; i < 64u; i++) {
+        total += sums[i];
+    }
+    let used = f32(max(rays, 1u));
+    counters.sum_steps += 1u;
+    counters.sum_rays += rays;
+    counters.sum_samples += counters.samples;
+    counters.sum_kept += counters.kept;
+    counters.sum_loss += dot(total, vec4(0.25)) / used;
+    counters.sum_color_error += (total.x + total.y + total.z) / (3.0 * used);
+
+    let asked = f32(counters.rays);
+    let fit_kept = f32(TARGET_KEPT) / max(f32(counters.kept_wanted), 1.0) * (used / asked);
+    let fit_samples = f32(TARGET_SAMPLES) / max(f32(counters.samples_wanted), 1.0);
+    let factor = clamp(min(fit_kept, fit_samples), 0.5, 1.5);
+    let next = clamp(u32(asked * factor), LEAST_RAYS, MOST_RAYS);
+    counters.rays = next;
+    dispatch[DISPATCH_RAYS] = workgroups(next, 64u);
+}

@@ -1,0 +1,30 @@
+// Provides: what a tile of a weight gradient reads and writes. Needs: count_kept.
+
+struct Tile {
+    // Quads per row of the inputs and of the gradients.
+    input_quads: u32,
+    output_quads: u32,
+    // Tiles along both.
+    input_tiles: u32,
+    output_tiles: u32,
+    // First quad of the layer in the weight buffer.
+    first_quad: u32,
+    // 1 when the inputs lie in the order of all marched samples.
+    of_samples: u32,
+    unused_1: u32,
+    unused_2: u32,
+}
+
+var<uniform> tile: Tile;
+var<storage, read> layer_input: array<vec4<f32>>;
+var<storage, read> d_output: array<vec4<f32>>;
+var<storage, read> kept_sample: array<u32>;
+// `[chunks, quads of all layers]`.
+var<storage, read_write> d_weight_chunks: array<vec4<f32>>;
+
+fn tile_row(row: u32) -> u32 {
+    if tile.of_samples == 1u {
+        return kept_sample[row];
+    }
+    return row;
+}

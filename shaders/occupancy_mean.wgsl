@@ -1,0 +1,25 @@
+// The mean over all cells that a camera sees. One workgroup.
+
+var<storage, read> occupancy: array<f32>;
+var<storage, read_write> occupancy_mean: array<f32>;
+var<workgroup> sums: array<vec2<f32>, 256>;
+
+@compute @workgroup_size(256)
+fn main(@builtin(local_invocation_index) thread: u32) {
+    var sum = vec2(0.0);
+    for (var i = thread; i < CELL_COUNT; i += 256u) {
+        let value = occupancy[i];
+        sum += select(vec2(0.0), vec2(value, 1.0), value >= 0.0);
+    }
+    sums[thread] = sum;
+    workgroupBarrier();
+    for (var half = 128u; half > 0u; half /= 2u) {
+        if thread < half {
+            sums[thread] += sums[thread + half];
+        }
+        workgroupBarrier();
+    }
+    if thread == 0u {
+        occupancy_mean[0] = sums[0].x / max(sums[0].y, 1.0);
+    }
+}

@@ -1,0 +1,27 @@
+// One random position in each cell of a chunk, as samples for the density network.
+// Needs: random, step, counters, occupancy.
+
+var<storage, read_write> counters: Counters;
+var<storage, read_write> samples: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let index = id.x;
+    if index == 0u {
+        counters.samples = step.cell_count;
+    }
+    if index >= step.cell_count {
+        return;
+    }
+    let cell = step.first_cell + index * step.cell_stride;
+    let within = cell % (CELLS * CELLS * CELLS);
+    let cascade = cell / (CELLS * CELLS * CELLS);
+    let corner = vec3(within % CELLS, (within / CELLS) % CELLS, within / (CELLS * CELLS));
+    let offset = vec3(
+        random_f32(step.stream, cell, RANDOM_CELL),
+        random_f32(step.stream, cell, RANDOM_CELL + 1u),
+        random_f32(step.stream, cell, RANDOM_CELL + 2u),
+    );
+    let position = ((vec3<f32>(corner) + offset) / f32(CELLS) - 0.5) * cascade_side(cascade) + 0.5;
+    samples[index] = vec4(position, 0.0);
+}

@@ -1,0 +1,37 @@
+// Writes the marked steps of each ray as samples: position in box space and length of the step.
+// Needs: random, step, counters, ray, stepping, march_start.
+
+var<storage, read> counters: Counters;
+var<storage, read> rays: array<Ray>;
+var<storage, read> ray_steps: array<u32>;
+var<storage, read> ray_spans: array<vec2<u32>>;
+// Position, and the step's length in units of the inner cube's side.
+var<storage, read_write> samples: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let index = id.x;
+    if index >= counters.rays_used {
+        return;
+    }
+    let span = ray_spans[index];
+    if span.y == 0u {
+        return;
+    }
+    let ray = rays[index];
+    let first = march_start(ray, index);
+    var written = 0u;
+    var word_index = 0u;
+    while written < span.y && word_index < STEP_WORDS {
+        var word = ray_steps[index * STEP_WORDS + word_index];
+        while word != 0u && written < span.y {
+            let u = first + f32(word_index * 32u + countTrailingZeros(word));
+            word &= word - 1u;
+            let t = stepping_distance(u);
+            let delta = (stepping_distance(u + 1.0) - t) * DENSITY_SCALE;
+            samples[span.x + written] = vec4(ray.origin + t * ray.direction, delta);
+            written++;
+        }
+        word_index++;
+    }
+}

@@ -1,0 +1,9 @@
+// Provides: equal steps of STEP_MIN along the ray; see `reference::march`.
+
+fn stepping_index(t: f32) -> f32 {
+    return t / STEP_MIN;
+}
+
+fn stepping_distance(u: f32) -> f32 {
+    return u * STEP_MIN;
+}

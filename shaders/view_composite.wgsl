@@ -1,0 +1,38 @@
+// Renders the rays of a view: colour, opacity and mean depth along the view axis.
+// Needs: counters, camera, exp, transmittance.
+
+var<storage, read> counters: Counters;
+var<storage, read> cameras: array<Camera>;
+var<storage, read> samples: array<vec4<f32>>;
+var<storage, read> kept_spans: array<vec2<u32>>;
+var<storage, read> kept_sample: array<u32>;
+var<storage, read> kept_steps: array<vec2<f32>>;
+var<storage, read> color: array<vec4<f32>>;
+// Premultiplied colour without background, and opacity.
+var<storage, read_write> view_color: array<vec4<f32>>;
+// In box units; 0 where the opacity is below 1e-3.
+var<storage, read_write> view_depth: array<f32>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let index = id.x;
+    if index >= counters.rays_used {
+        return;
+    }
+    let span = kept_spans[index];
+    let origin = cameras[0].origin;
+    let forward = -cameras[0].back;
+    var depth = 0.0;
+    var sum = vec4(0.0);
+    var distance = 0.0;
+    for (var i = span.x; i < span.x + span.y; i++) {
+        let step = kept_steps[i];
+        let tau = optical_depth(step.x, step.y);
+        let weight = transmittance_at(depth, tau) * opacity(tau);
+        sum += weight * vec4(color[i].rgb, 1.0);
+        distance += weight * dot(samples[kept_sample[i]].xyz - origin, forward);
+        depth += tau;
+    }
+    view_color[index] = sum;
+    view_depth[index] = select(0.0, distance / max(sum.a, 1e-6), sum.a >= 1e-3);
+}

@@ -1,0 +1,349 @@
+//! Every number that shapes a training, with its default; read from JSON, stored in the checkpoint.
+
+use anyhow::{Context, Result, bail};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::Path;
+
+/// The whole configuration. `Config::default()` suits a GPU; [`Config::for_cpu`] a software adapter.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// The multiresolution hash grid.
+    pub grid: Grid,
+    /// The two networks.
+    pub network: Network,
+    /// Steps along the rays.
+    pub march: March,
+    /// The occupancy grid.
+    pub occupancy: Occupancy,
+    /// Rays and samples per step.
+    pub batch: Batch,
+    /// Which samples get colour and gradients.
+    pub selection: Selection,
+    /// Adam and the learning-rate schedule.
+    pub optimizer: Optimizer,
+    /// What lies behind the scene while training.
+    pub background: Background,
+    /// Whether T_i holds what lies before sample i (exclusive) or sample i too (inclusive, as the derivation prints it).
+    pub transmittance: Transmittance,
+    /// How gradients of the table are summed; `auto` chooses by adapter.
+    pub accumulation: Accumulation,
+    /// Seed of every random number.
+    pub seed: u32,
+}
+
+/// The multiresolution hash grid (Müller et al. 2022).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Grid {
+    /// Number of levels, a multiple of 8 up to 32; two features each.
+    pub levels: usize,
+    /// Cells per axis of the coarsest level.
+    pub base: u32,
+    /// Cells per axis of the finest level; 0 follows the pixel footprint of the training views.
+    pub finest: u32,
+    /// Binary logarithm of the largest number of entries per level, 8 to 24.
+    pub log2_table: u32,
+}
+
+/// The density and the colour network: no biases, ReLU.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Network {
+    /// Width of the hidden layers, a multiple of 16 up to 128.
+    pub width: usize,
+    /// Hidden layers of the colour network, 1 to 4. The density network has one.
+    pub color_layers: usize,
+}
+
+/// Steps along the rays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct March {
+    /// Smallest steps along the diagonal of the inner cube.
+    pub steps: u32,
+    /// Growth of the step with the distance, in boxes larger than the inner cube.
+    pub cone: f64,
+    /// Most steps along one ray, a multiple of 32.
+    pub most_steps: usize,
+    /// Nothing is sampled nearer to the camera than this, in inner cubes.
+    pub near: f64,
+}
+
+/// The occupancy grid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Occupancy {
+    /// Cells per axis of each cascade, a multiple of 16 up to 256.
+    pub cells: u32,
+    /// Factor on a visited cell's value before the maximum is taken.
+    pub decay: f64,
+    /// A cell is occupied above this optical depth per smallest step (or the mean, if that is less).
+    pub threshold: f64,
+    /// Steps between updates.
+    pub interval: u32,
+    /// Steps during which every update visits all cells.
+    pub warm_up: u32,
+    /// After that, one cell in this many is visited by an update.
+    pub stride: u32,
+}
+
+/// Rays and samples per step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Batch {
+    /// Samples with colour and gradients per step; the number of rays follows.
+    pub kept: usize,
+    /// Most samples marched per step.
+    pub samples: usize,
+    /// Most rays per step.
+    pub rays: usize,
+    /// Rays of the first step.
+    pub first_rays: u32,
+}
+
+/// Which marched samples get colour and gradients.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Selection {
+    /// Samples of at least this weight are always kept.
+    pub weight_floor: f64,
+    /// Probability that a sample below the floor is kept; its density gradient is divided by it.
+    pub keep_probability: f64,
+    /// A ray ends where its transmittance falls below this.
+    pub stop_transmittance: f64,
+}
+
+/// Adam and the learning-rate schedule: a cosine over the budget of time or steps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Optimizer {
+    /// Learning rate at the start.
+    pub learning_rate: f64,
+    /// Learning rate at the end of the budget.
+    pub final_learning_rate: f64,
+    /// Decay of the first moment.
+    pub beta_1: f64,
+    /// Decay of the second moment.
+    pub beta_2: f64,
+    /// Added to the root of the second moment.
+    pub epsilon: f64,
+    /// L2 regularisation of the networks' weights; the table has none.
+    pub l2: f64,
+}
+
+/// What lies behind the scene while training.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Background {
+    /// Black: the opacity channel alone carries the alpha.
+    #[default]
+    Black,
+    /// White.
+    White,
+    /// Another colour for every ray and step.
+    Random,
+    /// One colour, in the field's colour space.
+    Color([f32; 3]),
+}
+
+/// The two sums of optical depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Transmittance {
+    /// Before the sample.
+    #[default]
+    Exclusive,
+    /// Up to and including the sample.
+    Inclusive,
+}
+
+/// How the gradients of the table are summed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Accumulation {
+    /// Fixed point on CPU adapters, float atomics elsewhere, compare-exchange where there are none.
+    #[default]
+    Auto,
+    /// Two fixed-point numbers in a 64-bit integer atomic: independent of order.
+    Fixed,
+    /// Float atomics.
+    Float,
+    /// Compare-exchange on the bits.
+    Exchange,
+}
+
+impl Default for Grid {
+    fn default() -> Self {
+        Self { levels: 16, base: 16, finest: 0, log2_table: 19 }
+    }
+}
+
+impl Default for Network {
+    fn default() -> Self {
+        Self { width: 64, color_layers: 2 }
+    }
+}
+
+impl Default for March {
+    fn default() -> Self {
+        Self { steps: 1024, cone: 1.0 / 256.0, most_steps: 1024, near: 0.05 }
+    }
+}
+
+impl Default for Occupancy {
+    fn default() -> Self {
+        Self { cells: 128, decay: 0.95, threshold: 0.01, interval: 16, warm_up: 256, stride: 4 }
+    }
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self { kept: 1 << 18, samples: 1 << 20, rays: 1 << 17, first_rays: 4096 }
+    }
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        Self { weight_floor: 1e-3, keep_probability: 0.2, stop_transmittance: 1e-4 }
+    }
+}
+
+impl Default for Optimizer {
+    fn default() -> Self {
+        Self {
+            learning_rate: 1e-2,
+            final_learning_rate: 1e-4,
+            beta_1: 0.9,
+            beta_2: 0.99,
+            epsilon: 1e-15,
+            l2: 1e-6,
+        }
+    }
+}
+
+const CPU_PRESET: &str = include_str!("../configs/cpu.json");
+
+impl Config {
+    /// The defaults for a software adapter: a smaller table, batch and network.
+    ///
+    /// # Errors
+    /// Never for the preset that is compiled in, which the tests read.
+    pub fn for_cpu() -> Result<Self> {
+        let mut config = Self::default();
+        let preset = serde_json::from_str(CPU_PRESET).context("reading the preset for CPU adapters")?;
+        config.merge(&preset)?;
+        Ok(config)
+    }
+
+    /// Overrides what `changes`, a JSON object of the same shape, mentions.
+    ///
+    /// # Errors
+    /// On an unknown key or a value of the wrong type.
+    pub fn merge(&mut self, changes: &Value) -> Result<()> {
+        let mut all = serde_json::to_value(&*self)?;
+        overlay(&mut all, changes);
+        *self = serde_json::from_value(all)?;
+        Ok(())
+    }
+
+    /// Overrides from the JSON file at `path`.
+    ///
+    /// # Errors
+    /// When it cannot be read, is not JSON, or does not fit; the message names the file.
+    pub fn merge_file(&mut self, path: &Path) -> Result<()> {
+        let name = path.display();
+        let text = std::fs::read_to_string(path).with_context(|| format!("reading the config {name}"))?;
+        let changes =
+            serde_json::from_str(&text).with_context(|| format!("the config {name} is not JSON"))?;
+        self.merge(&changes).with_context(|| format!("in the config {name}"))
+    }
+
+    /// Overrides one value, written `key.path=value`; the value is JSON, or else a string.
+    ///
+    /// # Errors
+    /// When there is no `=`, no such key, or the value does not fit.
+    pub fn set(&mut self, assignment: &str) -> Result<()> {
+        let Some((path, text)) = assignment.split_once('=') else {
+            bail!("--set expects key.path=value, for example grid.levels=8; found '{assignment}'");
+        };
+        let mut change = serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned()));
+        for key in path.rsplit('.') {
+            change = Value::Object([(key.to_owned(), change)].into_iter().collect());
+        }
+        self.merge(&change).with_context(|| format!("in --set {assignment}"))
+    }
+
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// Names the first key out of range, what is allowed and what was found.
+    pub fn validate(&self) -> Result<()> {
+        let Self { grid, network, march, occupancy, batch, selection, optimizer, .. } = self;
+        let whole = |key: &str, value: usize, low: usize, high: usize, step: usize| {
+            if value < low || value > high || !value.is_multiple_of(step) {
+                bail!("{key} must be a multiple of {step} from {low} to {high}; found {value}");
+            }
+            Ok(())
+        };
+        whole("grid.levels", grid.levels, 8, 32, 8)?;
+        whole("grid.base", grid.base as usize, 1, 1 << 16, 1)?;
+        whole("grid.finest", grid.finest as usize, 0, 1 << 20, 1)?;
+        whole("grid.log2_table", grid.log2_table as usize, 8, 24, 1)?;
+        whole("network.width", network.width, 16, 128, 16)?;
+        whole("network.color_layers", network.color_layers, 1, 4, 1)?;
+        whole("march.steps", march.steps as usize, 8, 1 << 14, 1)?;
+        whole("march.most_steps", march.most_steps, 32, 1 << 14, 32)?;
+        whole("occupancy.cells", occupancy.cells as usize, 16, 256, 16)?;
+        whole("occupancy.interval", occupancy.interval as usize, 1, 1 << 20, 1)?;
+        whole("occupancy.stride", occupancy.stride as usize, 1, 64, 1)?;
+        whole("batch.kept", batch.kept, march.most_steps, 1 << 22, 1)?;
+        whole("batch.samples", batch.samples, batch.kept.max(march.most_steps), 1 << 24, 1)?;
+        whole("batch.rays", batch.rays, 64, 1 << 22, 1)?;
+        whole("batch.first_rays", batch.first_rays as usize, 1, batch.rays, 1)?;
+        let real = |key: &str, value: f64, low: f64, high: f64| {
+            if !(low..=high).contains(&value) {
+                bail!("{key} must lie between {low} and {high}; found {value}");
+            }
+            Ok(())
+        };
+        real("march.cone", march.cone, 1e-5, 0.1)?;
+        real("march.near", march.near, 0.0, 10.0)?;
+        real("occupancy.decay", occupancy.decay, 0.0, 1.0)?;
+        real("occupancy.threshold", occupancy.threshold, 0.0, 1e6)?;
+        real("selection.weight_floor", selection.weight_floor, 0.0, 1.0)?;
+        real("selection.keep_probability", selection.keep_probability, 0.0, 1.0)?;
+        real("selection.stop_transmittance", selection.stop_transmittance, 0.0, 0.5)?;
+        real("optimizer.learning_rate", optimizer.learning_rate, 0.0, 1e3)?;
+        real("optimizer.final_learning_rate", optimizer.final_learning_rate, 0.0, 1e3)?;
+        real("optimizer.beta_1", optimizer.beta_1, 0.0, 0.999_999)?;
+        real("optimizer.beta_2", optimizer.beta_2, 0.0, 0.999_999)?;
+        real("optimizer.epsilon", optimizer.epsilon, 1e-30, 1.0)?;
+        real("optimizer.l2", optimizer.l2, 0.0, 1.0)
+    }
+}
+
+impl Background {
+    /// The colour behind the scene; black where it changes from ray to ray.
+    #[must_use]
+    pub fn solid(self) -> [f32; 3] {
+        match self {
+            Self::Black | Self::Random => [0.0; 3],
+            Self::White => [1.0; 3],
+            Self::Color(color) => color,
+        }
+    }
+}
+
+/// Replaces in `target` what `changes` mentions, object by object.
+fn overlay(target: &mut Value, changes: &Value) {
+    match (target, changes) {
+        (Value::Object(target), Value::Object(changes)) => {
+            for (key, change) in changes {
+                overlay(target.entry(key.clone()).or_insert(Value::Null), change);
+            }
+        }
+        (target, changes) => *target = changes.clone(),
+    }
+}

@@ -1,0 +1,158 @@
+//! Where a set of cameras looks, from their optical axes alone.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use crate::camera::Camera;
+
+/// What matters about a camera here, in world space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axis {
+    pub(super) origin: DVec3,
+    /// Unit direction through the middle of the image.
+    pub(super) direction: DVec3,
+    /// Tangent of half the larger field of view.
+    pub(super) tan_half: f64,
+}
+
+impl Axis {
+    pub(super) fn of(camera: &Camera) -> Self {
+        let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
+        let middle = camera.ray(0.5 * size);
+        Self {
+            origin: camera.position(),
+            direction: middle.map_or(camera.forward(), |ray| ray.direction),
+            tan_half: (0.5 * size / camera.focal_px).max_element(),
+        }
+    }
+
+    /// Distance along the axis, and away from it.
+    fn along_and_across(&self, point: DVec3) -> (f64, f64) {
+        let to_point = point - self.origin;
+        let along = to_point.dot(self.direction);
+        (along, (to_point - along * self.direction).length())
+    }
+
+    fn sees(&self, point: DVec3) -> bool {
+        let (along, across) = self.along_and_across(point);
+        along > 0.0 && across <= self.tan_half * along
+    }
+}
+
+/// The point a set of cameras looks at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Focus {
+    pub(super) point: DVec3,
+    /// Typical distance between a camera and what it looks at, above 0.
+    pub(super) distance: f64,
+    pub(super) kind: FocusKind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FocusKind {
+    /// The axes meet.
+    Crossing,
+    /// The axes do not tell, but the world's origin is in view.
+    Origin,
+    /// The axes do not tell: a point ahead of the cameras.
+    Ahead,
+    /// The cameras look outwards or past each other: the middle of the cameras.
+    Inside,
+}
+
+/// Finds the focus of at least one axis.
+pub(super) fn find(axes: &[Axis]) -> Focus {
+    let mean = axes.iter().map(|axis| axis.origin).sum::<DVec3>() / axes.len() as f64;
+    let spread = axes.iter().map(|axis| axis.origin.distance(mean));
+    let spread = spread.fold(0.0, f64::max);
+    let heading = axes.iter().map(|axis| axis.direction).sum::<DVec3>() / axes.len() as f64;
+    if let Some(crossing) = crossing(axes, mean, spread) {
+        return crossing;
+    }
+    if heading.length() > 0.9 {
+        return ahead(axes, mean, heading.normalize());
+    }
+    let point = DVec3::from_array(std::array::from_fn(|i| median(axes.iter().map(|axis| axis.origin[i]))));
+    let distance = median(axes.iter().map(|axis| axis.origin.distance(point)));
+    let known = [distance, spread, mean.length(), 1.0];
+    Focus { point, distance: known.into_iter().find(|&d| d > 0.0).unwrap_or(1.0), kind: FocusKind::Inside }
+}
+
+/// The projection onto the plane across a direction; a sum over axes finds the point nearest to all.
+fn across(direction: DVec3) -> DMat3 {
+    let outer = DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z);
+    DMat3::IDENTITY - outer
+}
+
+/// Axes within a fraction of a degree say nothing about where they meet.
+fn are_parallel(axes: &[Axis]) -> bool {
+    let sum: DMat3 = axes.iter().map(|axis| across(axis.direction)).sum();
+    (sum * (axes.len() as f64).recip()).determinant() < 1e-5
+}
+
+/// The least-squares crossing of the axes, with axes that miss it or point away from it counting less
+/// and less; `None` where most do.
+fn crossing(axes: &[Axis], mean: DVec3, spread: f64) -> Option<Focus> {
+    if are_parallel(axes) || spread == 0.0 {
+        return None;
+    }
+    let mut weights = vec![1.0; axes.len()];
+    let mut point = mean;
+    for _ in 0..30 {
+        let mut matrix = DMat3::ZERO;
+        let mut target = DVec3::ZERO;
+        for (axis, &weight) in axes.iter().zip(&weights) {
+            let across = weight * across(axis.direction);
+            matrix += across;
+            // Relative to the mean, or large coordinates would eat the digits.
+            target += across * ((axis.origin - mean) / spread);
+        }
+        let total: f64 = weights.iter().sum();
+        matrix *= total.recip();
+        if matrix.determinant().is_nan() || matrix.determinant() < 1e-6 {
+            return None;
+        }
+        point = mean + spread * (matrix.inverse() * (target / total));
+        let misses = axes.iter().map(|axis| axis.along_and_across(point).1);
+        let tolerance = median(misses).max(1e-6 * spread);
+        for (axis, weight) in axes.iter().zip(&mut weights) {
+            let (along, miss) = axis.along_and_across(point);
+            let behind = if along > 0.0 { 1.0 } else { 0.1 };
+            *weight = behind / (1.0 + (miss / (2.0 * tolerance)).powi(2));
+        }
+    }
+    let views = axes.iter().map(|axis| axis.along_and_across(point));
+    let looking = views.filter(|&(along, miss)| along > 0.0 && miss < along);
+    let distance = median(axes.iter().map(|axis| axis.origin.distance(point)));
+    (looking.count() * 10 >= axes.len() * 6 && distance > 0.0).then_some(Focus {
+        point,
+        distance,
+        kind: FocusKind::Crossing,
+    })
+}
+
+/// A single axis, parallel ones, or ones that fan out.
+fn ahead(axes: &[Axis], mean: DVec3, heading: DVec3) -> Focus {
+    let seeing = axes.iter().filter(|axis| axis.sees(DVec3::ZERO)).count();
+    if seeing * 10 >= axes.len() * 8 {
+        // Renderers put the object at the origin.
+        let distance = -mean.dot(heading);
+        return Focus { point: mean + distance * heading, distance, kind: FocusKind::Origin };
+    }
+    let away = |axis: &Axis| (across(heading) * (axis.origin - mean)).length();
+    let reach = axes.iter().map(away).fold(0.0, f64::max);
+    // Where the view of each camera reaches over all the others; a single camera has no such distance,
+    // and its distance from the origin is the only length there is.
+    let from_views = 2.0 * reach / median(axes.iter().map(|axis| axis.tan_half));
+    let lengths = [from_views, mean.length(), 1.0];
+    let single = reach <= 1e-9 * mean.length();
+    let usable = lengths.into_iter().skip(usize::from(single));
+    let distance = { usable }.find(|&d| d > 0.0).unwrap_or(1.0);
+    Focus { point: mean + distance * heading, distance, kind: FocusKind::Ahead }
+}
+
+/// The middle value, the upper one of two; not a number for none.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

@@ -1,0 +1,58 @@
+//! Writing files so that a crash never leaves half of one.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+/// Writes a file through `write` under a temporary name in the same folder, syncs it to disk and renames
+/// it to `path`: readers see the old file or the complete new one.
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let attempt = || -> Result<()> {
+        let temporary = temporary_in(folder)?;
+        let mut writer = BufWriter::new(temporary.reopen()?);
+        write(&mut writer)?;
+        writer.flush()?;
+        writer.get_ref().sync_all()?;
+        drop(writer);
+        temporary.persist(path)?;
+        Ok(())
+    };
+    attempt().with_context(|| format!("writing {}", path.display()))
+}
+
+fn temporary_in(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".nerf-").suffix(".part");
+    // Temporary files are private by default; results get the permissions any new file would get.
+    #[cfg(unix)]
+    let permissions: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+    #[cfg(unix)]
+    builder.permissions(permissions);
+    builder.tempfile_in(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn replaces_the_file_or_leaves_it_alone() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("out.txt");
+        write_atomically(&path, |w| Ok(w.write_all(b"first")?)).expect("writable");
+        let failed = write_atomically(&path, |w| {
+            w.write_all(b"half of the sec")?;
+            anyhow::bail!("disk on fire")
+        });
+        assert!(format!("{:#}", failed.expect_err("fails")).contains("out.txt: disk on fire"));
+        assert_eq!(std::fs::read(&path).expect("readable"), b"first");
+        let left = std::fs::read_dir(folder.path()).expect("readable").count();
+        assert_eq!(left, 1, "no temporary file may stay");
+    }
+}

@@ -1,0 +1,101 @@
+//! The device: adapter choice, linking of WGSL, pipelines bound by name, typed buffers and timers.
+//!
+//! Nothing here knows what a radiance field is.
+
+pub mod adapter;
+pub mod buffer;
+pub mod kernel;
+pub mod pass;
+pub mod source;
+pub mod timer;
+
+use anyhow::{Context, Result, anyhow};
+use std::sync::{Arc, Mutex};
+
+/// An open device and what it can do.
+#[derive(Debug)]
+pub struct Gpu {
+    /// The logical device.
+    pub device: wgpu::Device,
+    /// Its only queue.
+    pub queue: wgpu::Queue,
+    /// Name, driver and kind of the adapter.
+    pub info: wgpu::AdapterInfo,
+    error: Arc<Mutex<Option<String>>>,
+}
+
+/// Features that speed the training up and are used wherever the adapter has them.
+const WANTED_FEATURES: wgpu::Features = wgpu::Features::SHADER_FLOAT32_ATOMIC
+    .union(wgpu::Features::SHADER_INT64)
+    .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
+    .union(wgpu::Features::TIMESTAMP_QUERY);
+
+impl Gpu {
+    /// Opens `adapter` with its own limits and every wanted feature it has.
+    ///
+    /// # Errors
+    /// When the driver refuses to create the device.
+    pub fn open(adapter: &wgpu::Adapter) -> Result<Self> {
+        let info = adapter.get_info();
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("nerf"),
+            required_features: adapter.features() & WANTED_FEATURES,
+            required_limits: adapter.limits(),
+            memory_hints: wgpu::MemoryHints::Performance,
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .with_context(|| format!("opening the adapter '{}'", info.name))?;
+        let error = Arc::new(Mutex::new(None));
+        let sink = Arc::clone(&error);
+        device.on_uncaptured_error(Arc::new(move |failure: wgpu::Error| {
+            if let Ok(mut first) = sink.lock() {
+                first.get_or_insert_with(|| failure.to_string());
+            }
+        }));
+        Ok(Self { device, queue, info, error })
+    }
+
+    /// Whether the adapter runs on the CPU (lavapipe, WARP), where the fast layout is another one.
+    #[must_use]
+    pub fn is_cpu(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether the opened device has `features`.
+    #[must_use]
+    pub fn has(&self, features: wgpu::Features) -> bool {
+        self.device.features().contains(features)
+    }
+
+    /// Submits the recorded commands.
+    pub fn submit(&self, encoder: wgpu::CommandEncoder) {
+        self.queue.submit([encoder.finish()]);
+    }
+
+    /// Starts recording commands.
+    #[must_use]
+    pub fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
+    }
+
+    /// Waits until everything submitted has run.
+    ///
+    /// # Errors
+    /// When the device was lost or a command was invalid; the first driver message is passed on.
+    pub fn wait(&self) -> Result<()> {
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|failure| anyhow!("waiting for the adapter '{}': {failure}", self.info.name))?;
+        self.check()
+    }
+
+    /// Reports the first error the device raised outside of a call that could return it.
+    ///
+    /// # Errors
+    /// That error, with the adapter's name.
+    pub fn check(&self) -> Result<()> {
+        let first = self.error.lock().map_or(None, |slot| slot.clone());
+        first.map_or(Ok(()), |message| Err(anyhow!("the adapter '{}' reported: {message}", self.info.name)))
+    }
+}

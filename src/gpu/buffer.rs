@@ -1,0 +1,116 @@
+//! Buffers with a name, and typed transfers to and from them.
+
+use super::Gpu;
+use anyhow::{Result, bail};
+use bytemuck::Pod;
+use wgpu::BufferUsages as Usage;
+
+/// A device buffer; its label is the name kernels bind it by.
+#[derive(Clone, Debug)]
+pub struct Buffer {
+    /// The name of the WGSL variable it stands for.
+    pub name: &'static str,
+    /// The device buffer.
+    pub raw: wgpu::Buffer,
+}
+
+impl Gpu {
+    /// A zeroed storage buffer of `count` elements of `T`.
+    ///
+    /// # Errors
+    /// When it is larger than the adapter can bind; the message tells both sizes.
+    pub fn storage<T>(&self, name: &'static str, count: usize) -> Result<Buffer> {
+        self.buffer(name, (count * size_of::<T>()) as u64, Usage::STORAGE)
+    }
+
+    /// A zeroed buffer that kernels read as uniform and write as storage.
+    ///
+    /// # Errors
+    /// As [`Gpu::storage`].
+    pub fn uniform_storage<T>(&self, name: &'static str, count: usize) -> Result<Buffer> {
+        self.buffer(name, (count * size_of::<T>()) as u64, Usage::STORAGE | Usage::UNIFORM)
+    }
+
+    /// A storage buffer that also holds the sizes of indirect dispatches.
+    ///
+    /// # Errors
+    /// As [`Gpu::storage`].
+    pub fn indirect(&self, name: &'static str, count: usize) -> Result<Buffer> {
+        self.buffer(name, (count * size_of::<u32>()) as u64, Usage::STORAGE | Usage::INDIRECT)
+    }
+
+    /// A uniform buffer of one `T`.
+    ///
+    /// # Errors
+    /// As [`Gpu::storage`].
+    pub fn uniform<T: Pod>(&self, name: &'static str, value: &T) -> Result<Buffer> {
+        let buffer = self.buffer(name, size_of::<T>() as u64, Usage::UNIFORM)?;
+        self.write(&buffer, 0, std::slice::from_ref(value));
+        Ok(buffer)
+    }
+
+    /// A storage buffer filled with `data`.
+    ///
+    /// # Errors
+    /// As [`Gpu::storage`].
+    pub fn storage_with<T: Pod>(&self, name: &'static str, data: &[T]) -> Result<Buffer> {
+        let buffer = self.storage::<T>(name, data.len().max(1))?;
+        self.write(&buffer, 0, data);
+        Ok(buffer)
+    }
+
+    fn buffer(&self, name: &'static str, bytes: u64, usage: Usage) -> Result<Buffer> {
+        let limits = self.device.limits();
+        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+        if bytes > most {
+            bail!(
+                "the buffer '{name}' needs {bytes} bytes, and the adapter '{}' binds at most {most}; \
+                 use fewer or smaller images, a smaller grid (`--set grid.log2_table=…`) or a smaller batch",
+                self.info.name
+            );
+        }
+        let raw = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(name),
+            size: bytes.max(16).next_multiple_of(16),
+            usage: usage | Usage::COPY_DST | Usage::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        Ok(Buffer { name, raw })
+    }
+
+    /// Writes `data` at element `first` of `buffer`, before the next submission.
+    pub fn write<T: Pod>(&self, buffer: &Buffer, first: usize, data: &[T]) {
+        let offset = (first * size_of::<T>()) as u64;
+        self.queue.write_buffer(&buffer.raw, offset, bytemuck::cast_slice(data));
+    }
+
+    /// Reads `count` elements of `buffer` from element `first` on, waiting for the device.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn read<T: Pod>(&self, buffer: &Buffer, first: usize, count: usize) -> Result<Vec<T>> {
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let bytes = (count * size_of::<T>()) as u64;
+        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size: bytes.next_multiple_of(4),
+            usage: Usage::MAP_READ | Usage::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.encoder("read back");
+        encoder.copy_buffer_to_buffer(
+            &buffer.raw,
+            (first * size_of::<T>()) as u64,
+            &staging,
+            0,
+            bytes.next_multiple_of(4),
+        );
+        self.submit(encoder);
+        staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        self.wait()?;
+        let mapped = staging.get_mapped_range(..)?;
+        Ok(bytemuck::pod_collect_to_vec(&mapped[..bytes as usize]))
+    }
+}

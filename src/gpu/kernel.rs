@@ -1,0 +1,206 @@
+//! A compute pipeline whose buffers are bound by name and whose structs are checked against Rust's.
+
+use super::Gpu;
+use super::buffer::Buffer;
+use super::source::{Binding, Linked, Source};
+use anyhow::{Result, anyhow, bail};
+use std::borrow::Cow;
+use wgpu::naga;
+
+/// Name, fields and size of a `#[repr(C)]` struct that is shared with WGSL.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout {
+    /// The struct's name in both languages.
+    pub name: &'static str,
+    /// Each field with its byte offset.
+    pub fields: &'static [(&'static str, usize)],
+    /// Size in bytes.
+    pub size: usize,
+}
+
+/// A struct shared with WGSL; made by [`crate::gpu_struct!`].
+pub trait Shared: bytemuck::Pod {
+    /// Where its fields lie.
+    const LAYOUT: Layout;
+}
+
+/// Defines a `#[repr(C)]` struct of plain numbers together with its field list.
+#[macro_export]
+macro_rules! gpu_struct {
+    ($(#[$meta:meta])* $name:ident { $($(#[$field_meta:meta])* $field:ident: $kind:ty),* $(,)? }) => {
+        $(#[$meta])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+        pub struct $name { $($(#[$field_meta])* pub $field: $kind),* }
+        impl $crate::gpu::kernel::Shared for $name {
+            const LAYOUT: $crate::gpu::kernel::Layout = $crate::gpu::kernel::Layout {
+                name: stringify!($name),
+                fields: &[$((stringify!($field), core::mem::offset_of!($name, $field))),*],
+                size: core::mem::size_of::<$name>(),
+            };
+        }
+    };
+}
+
+/// A compiled kernel with the entry point `main`.
+#[derive(Debug)]
+pub struct Kernel {
+    /// The kernel's name, also in profiles.
+    pub label: String,
+    pipeline: wgpu::ComputePipeline,
+    group: wgpu::BindGroupLayout,
+    bindings: Vec<Binding>,
+}
+
+/// A kernel with its buffers: ready to be dispatched.
+#[derive(Debug)]
+pub struct Bound {
+    /// The kernel's name.
+    pub label: String,
+    pub(super) pipeline: wgpu::ComputePipeline,
+    pub(super) group: wgpu::BindGroup,
+}
+
+/// A buffer, or a byte range of one, under the name a kernel knows it by.
+#[derive(Clone, Copy, Debug)]
+pub struct Resource<'a> {
+    /// The WGSL variable's name.
+    pub name: &'a str,
+    /// The buffer.
+    pub buffer: &'a Buffer,
+    /// Byte offset and length; `None` for the whole buffer.
+    pub range: Option<(u64, u64)>,
+}
+
+impl Buffer {
+    /// The whole buffer under its own name.
+    #[must_use]
+    pub fn resource(&self) -> Resource<'_> {
+        self.named(self.name)
+    }
+
+    /// The whole buffer under another name.
+    #[must_use]
+    pub fn named<'a>(&'a self, name: &'a str) -> Resource<'a> {
+        Resource { name, buffer: self, range: None }
+    }
+}
+
+impl Kernel {
+    /// Links `source`, compares its structs with `layouts` and creates the pipeline.
+    ///
+    /// # Errors
+    /// When the WGSL does not link, a struct differs from Rust's, or the driver refuses the pipeline.
+    pub fn new(gpu: &Gpu, source: &Source, layouts: &[Layout]) -> Result<Self> {
+        let Linked { label, module, bindings } = source.link()?;
+        for layout in layouts {
+            compare_layout(&label, &module, layout)?;
+        }
+        let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(&label),
+            source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
+        });
+        let group = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(&label),
+            entries: &layout_entries(&bindings),
+        });
+        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(&label),
+            bind_group_layouts: &[Some(&group)],
+            immediate_size: 0,
+        });
+        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(&label),
+            layout: Some(&layout),
+            module: &shader,
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        if let Some(error) = pollster::block_on(scope.pop()) {
+            bail!("creating the kernel '{label}' on '{}': {error}", gpu.info.name);
+        }
+        Ok(Self { label, pipeline, group, bindings })
+    }
+
+    /// Binds the buffers this kernel uses out of `resources`; others are ignored.
+    ///
+    /// # Errors
+    /// When one is missing: a mistake in the program, named so that it is found at once.
+    pub fn bind(&self, gpu: &Gpu, resources: &[Resource<'_>]) -> Result<Bound> {
+        let entries = self
+            .bindings
+            .iter()
+            .enumerate()
+            .map(|(index, binding)| {
+                let found = resources.iter().find(|r| r.name == binding.name).ok_or_else(|| {
+                    anyhow!("the kernel '{}' needs the buffer '{}'", self.label, binding.name)
+                })?;
+                let (offset, size) =
+                    found.range.map_or((0, None), |(offset, length)| (offset, wgpu::BufferSize::new(length)));
+                Ok(wgpu::BindGroupEntry {
+                    binding: index as u32,
+                    resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                        buffer: &found.buffer.raw,
+                        offset,
+                        size,
+                    }),
+                })
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(&self.label),
+            layout: &self.group,
+            entries: &entries,
+        });
+        Ok(Bound { label: self.label.clone(), pipeline: self.pipeline.clone(), group })
+    }
+
+    /// The names of the buffers it uses.
+    pub fn buffers(&self) -> impl Iterator<Item = &str> {
+        self.bindings.iter().map(|binding| binding.name.as_str())
+    }
+}
+
+fn layout_entries(bindings: &[Binding]) -> Vec<wgpu::BindGroupLayoutEntry> {
+    bindings
+        .iter()
+        .enumerate()
+        .map(|(index, binding)| wgpu::BindGroupLayoutEntry {
+            binding: index as u32,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: binding.kind,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        })
+        .collect()
+}
+
+/// Compares a Rust struct with the WGSL struct of the same name.
+fn compare_layout(label: &str, module: &naga::Module, layout: &Layout) -> Result<()> {
+    let found = module.types.iter().find(|(_, kind)| kind.name.as_deref() == Some(layout.name));
+    let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
+        bail!("the kernel '{label}' has no struct '{}'", layout.name);
+    };
+    let wgsl: Vec<(String, usize)> = members
+        .iter()
+        .map(|member| (member.name.clone().unwrap_or_default(), member.offset as usize))
+        .collect();
+    let rust: Vec<(String, usize)> =
+        layout.fields.iter().map(|&(name, offset)| (name.to_owned(), offset)).collect();
+    if wgsl != rust || *span as usize != layout.size {
+        bail!(
+            "the struct '{}' of the kernel '{label}' differs:\n  WGSL {wgsl:?}, {span} bytes\n  Rust {rust:?}, {} bytes",
+            layout.name,
+            layout.size
+        );
+    }
+    Ok(())
+}

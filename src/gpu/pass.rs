@@ -1,0 +1,81 @@
+//! A list of dispatches: what one step of the training does, in order.
+
+use super::Gpu;
+use super::buffer::Buffer;
+use super::kernel::Bound;
+use super::timer::Timer;
+
+/// How many workgroups a stage launches.
+#[derive(Clone, Debug)]
+pub enum Size {
+    /// Fixed numbers along x and y.
+    Fixed(u32, u32),
+    /// Three numbers written by an earlier kernel, at this index of an array of vec3 (16 bytes apart).
+    Indirect(Buffer, usize),
+}
+
+/// One dispatch.
+#[derive(Debug)]
+pub struct Stage {
+    /// The kernel and its buffers.
+    pub bound: Bound,
+    /// Its size.
+    pub size: Size,
+}
+
+impl Stage {
+    /// A stage of fixed size.
+    #[must_use]
+    pub fn fixed(bound: Bound, x: usize, y: usize) -> Self {
+        Self { bound, size: Size::Fixed(x as u32, y as u32) }
+    }
+
+    /// A stage whose size lies at `index` of `dispatch`.
+    #[must_use]
+    pub fn indirect(bound: Bound, dispatch: &Buffer, index: usize) -> Self {
+        Self { bound, size: Size::Indirect(dispatch.clone(), index) }
+    }
+
+    fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
+        pass.set_pipeline(&self.bound.pipeline);
+        pass.set_bind_group(0, &self.bound.group, &[]);
+        match &self.size {
+            Size::Fixed(x, y) => pass.dispatch_workgroups(*x, *y, 1),
+            Size::Indirect(buffer, index) => {
+                pass.dispatch_workgroups_indirect(&buffer.raw, (index * 4 * size_of::<u32>()) as u64);
+            }
+        }
+    }
+}
+
+impl Gpu {
+    /// Submits `stages` in order; with a timer, each in a pass of its own between two timestamps.
+    pub fn run<'a>(
+        &self,
+        label: &str,
+        stages: impl IntoIterator<Item = &'a Stage>,
+        timer: Option<&mut Timer>,
+    ) {
+        let mut encoder = self.encoder(label);
+        if let Some(timer) = timer {
+            for stage in stages {
+                let writes = timer.writes(&stage.bound.label);
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                    label: Some(&stage.bound.label),
+                    timestamp_writes: writes,
+                });
+                stage.record(&mut pass);
+            }
+            timer.resolve(&mut encoder);
+        } else {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some(label),
+                timestamp_writes: None,
+            });
+            for stage in stages {
+                stage.record(&mut pass);
+            }
+        }
+        self.submit(encoder);
+    }
+}

@@ -1,0 +1,155 @@
+//! Linking WGSL: generated constants in front of whole files, checked and bound by naga.
+//!
+//! A part declares the buffers it touches without `@group` and `@binding`; the linker numbers them, and
+//! [`super::kernel::Kernel`] binds them by name.
+
+use anyhow::{Result, anyhow};
+use std::fmt::{Display, Write};
+use wgpu::naga;
+
+/// WGSL text under construction: constants first, then parts, each once.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    label: String,
+    constants: String,
+    parts: Vec<(String, String)>,
+}
+
+/// A checked module and which of its buffers the entry point uses.
+#[derive(Debug)]
+pub struct Linked {
+    /// The kernel's name.
+    pub label: String,
+    /// The module, its buffers numbered in the order of `bindings`.
+    pub module: naga::Module,
+    /// The buffers the entry point `main` reaches; the index is the binding number.
+    pub bindings: Vec<Binding>,
+}
+
+/// One buffer of a kernel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Binding {
+    /// The WGSL variable's name.
+    pub name: String,
+    /// How the kernel sees it.
+    pub kind: wgpu::BufferBindingType,
+}
+
+impl Source {
+    /// An empty source for the kernel `label`.
+    #[must_use]
+    pub fn new(label: &str) -> Self {
+        Self { label: label.to_owned(), ..Self::default() }
+    }
+
+    /// Adds `const name = value;`, the value written as WGSL reads it (`4u`, `0.5`).
+    #[must_use]
+    pub fn constant(mut self, name: &str, value: impl Display) -> Self {
+        // Writing to a String cannot fail.
+        let _ = writeln!(self.constants, "const {name} = {value};");
+        self
+    }
+
+    /// Adds an f32 constant with all its digits.
+    #[must_use]
+    pub fn float(self, name: &str, value: f64) -> Self {
+        let value = value as f32;
+        self.constant(name, format_args!("f32({value:?})"))
+    }
+
+    /// Adds a u32 constant.
+    #[must_use]
+    pub fn count(self, name: &str, value: usize) -> Self {
+        self.constant(name, format_args!("{value}u"))
+    }
+
+    /// Adds a whole file; a name that is already there is not added twice.
+    #[must_use]
+    pub fn part(mut self, name: &str, text: impl Into<String>) -> Self {
+        if !self.parts.iter().any(|(present, _)| present == name) {
+            self.parts.push((name.to_owned(), text.into()));
+        }
+        self
+    }
+
+    /// The text that the driver compiles, before the buffers are numbered.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = self.constants.clone();
+        for (name, part) in &self.parts {
+            let _ = writeln!(text, "// {name}\n{part}");
+        }
+        text
+    }
+
+    /// Parses, numbers the buffers and validates.
+    ///
+    /// # Errors
+    /// naga's message with the part and its line.
+    pub fn link(&self) -> Result<Linked> {
+        let text = self.text();
+        let mut module = naga::front::wgsl::parse_str(&text).map_err(|error| {
+            let place = error.location(&text).map_or(String::new(), |at| self.place(at.line_number));
+            anyhow!("linking the kernel '{}': {place}: {}", self.label, error.emit_to_string(&text))
+        })?;
+        for (index, (_, variable)) in module.global_variables.iter_mut().enumerate() {
+            if is_buffer(variable.space) {
+                variable.binding = Some(naga::ResourceBinding { group: 0, binding: index as u32 });
+            }
+        }
+        let info = naga::valid::Validator::new(
+            naga::valid::ValidationFlags::all(),
+            naga::valid::Capabilities::all(),
+        )
+        .validate(&module)
+        .map_err(|error| anyhow!("checking the kernel '{}': {}", self.label, error.emit_to_string(&text)))?;
+        let entry = info.get_entry_point(0);
+        let mut bindings = Vec::new();
+        for (handle, variable) in module.global_variables.iter_mut() {
+            variable.binding = None;
+            if is_buffer(variable.space) && !entry[handle].is_empty() {
+                let binding = bindings.len() as u32;
+                variable.binding = Some(naga::ResourceBinding { group: 0, binding });
+                bindings.push(Binding {
+                    name: variable.name.clone().unwrap_or_default(),
+                    kind: binding_type(variable.space),
+                });
+            }
+        }
+        // What the entry point does not reach gets numbers behind the used ones, to stay valid.
+        let mut next = bindings.len() as u32;
+        for (_, variable) in module.global_variables.iter_mut() {
+            if is_buffer(variable.space) && variable.binding.is_none() {
+                variable.binding = Some(naga::ResourceBinding { group: 0, binding: next });
+                next += 1;
+            }
+        }
+        Ok(Linked { label: self.label.clone(), module, bindings })
+    }
+
+    /// Names the part that holds `line` of the linked text, and the line within it.
+    fn place(&self, line: u32) -> String {
+        let mut first = self.constants.lines().count() as u32 + 1;
+        for (name, part) in &self.parts {
+            let length = part.lines().count() as u32 + 1;
+            if line < first + length + 1 {
+                return format!("{name}:{}", line.saturating_sub(first));
+            }
+            first += length + u32::from(part.ends_with('\n'));
+        }
+        "constants".to_owned()
+    }
+}
+
+fn is_buffer(space: naga::AddressSpace) -> bool {
+    matches!(space, naga::AddressSpace::Storage { .. } | naga::AddressSpace::Uniform)
+}
+
+fn binding_type(space: naga::AddressSpace) -> wgpu::BufferBindingType {
+    match space {
+        naga::AddressSpace::Storage { access } => {
+            wgpu::BufferBindingType::Storage { read_only: !access.contains(naga::StorageAccess::STORE) }
+        }
+        _ => wgpu::BufferBindingType::Uniform,
+    }
+}

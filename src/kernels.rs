@@ -1,0 +1,456 @@
+//! The list of kernels: which parts each one links, which buffers it is given, in which order they run.
+//!
+//! Parts for what a scene does not need (a lens, cascades, alpha, …) are not linked, their buffers are not
+//! allocated and their stages are not dispatched.
+
+/// Includes a file of `shaders/` as a [`Part`].
+macro_rules! part {
+    ($path:literal) => {
+        ($path, include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $path)))
+    };
+}
+
+pub mod color;
+pub mod density;
+pub mod layer;
+pub mod marching;
+pub mod occupancy;
+pub mod training;
+pub mod viewing;
+
+use crate::config::{Accumulation, Background, Config, Transmittance};
+use crate::gpu::Gpu;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::kernel::{Bound, Kernel, Resource, Shared};
+use crate::gpu::source::Source;
+use crate::gpu_struct;
+use crate::model::{DENSITY_OUTPUTS, Layout, Level};
+use anyhow::Result;
+use std::fmt::Display;
+
+/// A file of WGSL under its name.
+pub type Part = (&'static str, &'static str);
+
+const RANDOM: Part = part!("common/random.wgsl");
+const STEP: Part = part!("common/step.wgsl");
+const COUNTERS: Part = part!("common/counters.wgsl");
+const RAY: Part = part!("common/ray.wgsl");
+const CAMERA: Part = part!("common/camera.wgsl");
+const OCCUPANCY: Part = part!("common/occupancy.wgsl");
+const MARCH_START: Part = part!("common/march_start.wgsl");
+const EXP: Part = part!("common/exp.wgsl");
+const DENSITY: Part = part!("common/density.wgsl");
+const GRID: Part = part!("common/grid.wgsl");
+const HARMONICS: Part = part!("common/harmonics.wgsl");
+const ADAM: Part = part!("common/adam.wgsl");
+const COUNT_SAMPLES: Part = part!("layer/count_samples.wgsl");
+const COUNT_KEPT: Part = part!("layer/count_kept.wgsl");
+
+/// Indices of the dispatch sizes that kernels write.
+pub mod dispatch {
+    /// Over rays.
+    pub const RAYS: usize = 0;
+    /// Over marched samples.
+    pub const SAMPLES: usize = 1;
+    /// Over marched samples, several per thread.
+    pub const SAMPLE_TILES: usize = 2;
+    /// Over kept samples.
+    pub const KEPT: usize = 3;
+    /// Over kept samples, several per thread.
+    pub const KEPT_TILES: usize = 4;
+    /// How many there are.
+    pub const COUNT: usize = 5;
+}
+
+gpu_struct! {
+    /// The numbers that change from step to step.
+    Step {
+        /// Start of this step's random numbers.
+        stream: u32,
+        /// First pixel of a chunk of a view.
+        first_pixel: u32,
+        /// First cell of an occupancy chunk.
+        first_cell: u32,
+        /// Distance between its cells.
+        cell_stride: u32,
+        /// Number of its cells.
+        cell_count: u32,
+        /// Adam's learning rate.
+        learning_rate: f32,
+        /// 1 / (1 - beta_1^t).
+        first_correction: f32,
+        /// 1 / (1 - beta_2^t).
+        second_correction: f32,
+    }
+}
+
+gpu_struct! {
+    /// What is counted on the device; see `shaders/common/counters.wgsl`.
+    Counters {
+        /// Rays of the next step.
+        rays: u32,
+        /// Rays whose samples fit.
+        rays_used: u32,
+        /// Marched samples.
+        samples: u32,
+        /// Marched samples all rays asked for.
+        samples_wanted: u32,
+        /// Kept samples.
+        kept: u32,
+        /// Kept samples all rays asked for.
+        kept_wanted: u32,
+        /// Steps since the sums were cleared.
+        sum_steps: u32,
+        /// Rays since then.
+        sum_rays: u32,
+        /// Marched samples since then.
+        sum_samples: u32,
+        /// Kept samples since then.
+        sum_kept: u32,
+        /// Sum of the steps' losses.
+        sum_loss: f32,
+        /// Sum of the steps' mean squared colour errors.
+        sum_color_error: f32,
+    }
+}
+
+gpu_struct! {
+    /// A camera in box space; see `shaders/common/camera.wgsl`.
+    Camera {
+        /// Position.
+        origin: [f32; 3],
+        /// Pixels per row.
+        width: u32,
+        /// +X axis.
+        right: [f32; 3],
+        /// Rows.
+        height: u32,
+        /// +Y axis.
+        up: [f32; 3],
+        /// Index of the image's first pixel.
+        first_texel: u32,
+        /// +Z axis, away from the view.
+        back: [f32; 3],
+        /// Padding.
+        unused: u32,
+        /// Focal lengths.
+        focal_px: [f32; 2],
+        /// Principal point.
+        center_px: [f32; 2],
+        /// k1..k4.
+        radial: [f32; 4],
+        /// p1, p2.
+        tangential: [f32; 2],
+        /// Padding.
+        unused_2: [f32; 2],
+    }
+}
+
+/// What a scene needs, apart from the configuration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Needs {
+    /// Some camera has lens distortion.
+    pub lens: bool,
+    /// Pixels are linear floats.
+    pub hdr: bool,
+    /// Cascades of the occupancy grid; 1 for a bounded scene.
+    pub cascades: u32,
+    /// The scene's box inside of box space.
+    pub box_min: [f32; 3],
+    /// Its other corner.
+    pub box_max: [f32; 3],
+    /// Training cameras.
+    pub cameras: usize,
+}
+
+/// Everything that decides how kernels are linked.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The resolved configuration.
+    pub config: Config,
+    /// The parameters' layout.
+    pub layout: Layout,
+    /// What the scene needs.
+    pub needs: Needs,
+    /// Samples that one thread of a matrix product handles.
+    pub samples_per_thread: usize,
+    /// How the table's gradients are summed.
+    pub accumulation: Accumulation,
+}
+
+/// Chunks of samples whose weight gradients are summed apart.
+pub const CHUNKS: usize = 64;
+
+impl Plan {
+    /// Chooses what depends on the adapter.
+    #[must_use]
+    pub fn new(gpu: &Gpu, config: Config, layout: Layout, needs: Needs) -> Self {
+        let int64 = wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS;
+        let accumulation = match config.accumulation {
+            Accumulation::Auto if gpu.is_cpu() && gpu.has(int64) && !needs.hdr => Accumulation::Fixed,
+            Accumulation::Auto if gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC) => Accumulation::Float,
+            Accumulation::Auto => Accumulation::Exchange,
+            chosen => chosen,
+        };
+        let samples_per_thread = if gpu.is_cpu() { 4 } else { 2 };
+        Self { config, layout, needs, samples_per_thread, accumulation }
+    }
+
+    /// The smallest step in box units.
+    #[must_use]
+    pub fn step_min(&self) -> f64 {
+        3f64.sqrt() / f64::from(self.config.march.steps) / self.density_scale()
+    }
+
+    /// Inner cubes along the box: densities are per inner cube.
+    #[must_use]
+    pub fn density_scale(&self) -> f64 {
+        f64::from(1u32 << (self.needs.cascades - 1))
+    }
+
+    /// Cells of the occupancy grid over all cascades.
+    #[must_use]
+    pub fn cell_count(&self) -> usize {
+        (self.config.occupancy.cells as usize).pow(3) * self.needs.cascades as usize
+    }
+
+    /// Words that hold one bit per step of a ray.
+    #[must_use]
+    pub fn step_words(&self) -> usize {
+        self.config.march.most_steps.div_ceil(32)
+    }
+
+    /// A kernel that links `parts` behind the plan's constants.
+    ///
+    /// # Errors
+    /// As [`Kernel::new`].
+    pub fn kernel(&self, gpu: &Gpu, label: &str, parts: &[Part]) -> Result<Kernel> {
+        self.finish_kernel(gpu, self.source(label, parts), parts)
+    }
+
+    /// As [`Plan::kernel`], with one generated part and constants of its own.
+    ///
+    /// # Errors
+    /// As [`Kernel::new`].
+    pub fn generated_kernel(
+        &self,
+        gpu: &Gpu,
+        label: &str,
+        parts: &[Part],
+        numbers: &[(&str, usize)],
+        text: String,
+    ) -> Result<Kernel> {
+        let mut source = self.source(label, parts).part("generated", text);
+        for (name, value) in numbers {
+            source = source.count(name, *value);
+        }
+        self.finish_kernel(gpu, source, parts)
+    }
+
+    fn finish_kernel(&self, gpu: &Gpu, source: Source, parts: &[Part]) -> Result<Kernel> {
+        let shared = [
+            (STEP, Step::LAYOUT),
+            (COUNTERS, Counters::LAYOUT),
+            (CAMERA, Camera::LAYOUT),
+            (GRID, Level::LAYOUT),
+        ];
+        let layouts: Vec<_> =
+            shared.iter().filter(|(part, _)| parts.contains(part)).map(|(_, layout)| *layout).collect();
+        Kernel::new(gpu, &source, &layouts)
+    }
+
+    /// The text of a kernel, before it is linked.
+    #[must_use]
+    pub fn source(&self, label: &str, parts: &[Part]) -> Source {
+        let source = self.numbers(self.dimensions(Source::new(label)));
+        parts.iter().fold(source, |source, (name, text)| source.part(name, *text))
+    }
+
+    fn dimensions(&self, source: Source) -> Source {
+        let Self { config, layout, needs, .. } = self;
+        let counts = [
+            ("LEVELS", layout.levels.len()),
+            ("TABLE_ENTRIES", layout.entries),
+            ("DENSITY_OUTPUTS", DENSITY_OUTPUTS),
+            ("MLP_QUADS", layout.quads),
+            ("CHUNKS", CHUNKS),
+            ("SAMPLES_PER_THREAD", self.samples_per_thread),
+            ("CELLS", config.occupancy.cells as usize),
+            ("CELL_COUNT", self.cell_count()),
+            ("CASCADES", needs.cascades as usize),
+            ("CAMERA_COUNT", needs.cameras.max(1)),
+            ("MAX_STEPS", config.march.most_steps),
+            ("STEP_WORDS", self.step_words()),
+            ("TARGET_KEPT", config.batch.kept),
+            ("TARGET_SAMPLES", config.batch.samples / 8 * 7),
+            ("LEAST_RAYS", 16),
+            ("MOST_RAYS", config.batch.rays),
+            ("DISPATCH_RAYS", dispatch::RAYS),
+            ("DISPATCH_SAMPLES", dispatch::SAMPLES),
+            ("DISPATCH_SAMPLE_TILES", dispatch::SAMPLE_TILES),
+            ("DISPATCH_KEPT", dispatch::KEPT),
+            ("DISPATCH_KEPT_TILES", dispatch::KEPT_TILES),
+            ("RANDOM_IMAGE", 0),
+            ("RANDOM_PIXEL", 1),
+            ("RANDOM_OFFSET", 2),
+            ("RANDOM_SELECTION", 3),
+            ("RANDOM_BACKGROUND", 4),
+            ("RANDOM_CELL", 8),
+        ];
+        counts.iter().fold(source, |source, (name, value)| source.count(name, *value))
+    }
+
+    fn numbers(&self, source: Source) -> Source {
+        let Self { config, needs, .. } = self;
+        let floats = [
+            ("STEP_MIN", self.step_min()),
+            ("STEP_MAX", 1.0 / f64::from(config.occupancy.cells)),
+            ("CONE", config.march.cone),
+            ("LOG_CONE", config.march.cone.ln_1p()),
+            ("DENSITY_SCALE", self.density_scale()),
+            ("T_NEAR", config.march.near / self.density_scale()),
+            ("KEEP_PROBABILITY", config.selection.keep_probability.max(1e-6)),
+            ("STOP_TRANSMITTANCE", config.selection.stop_transmittance),
+            ("OCCUPANCY_DECAY", config.occupancy.decay),
+            ("OCCUPANCY_THRESHOLD", config.occupancy.threshold),
+            ("BETA_1", config.optimizer.beta_1),
+            ("BETA_2", config.optimizer.beta_2),
+            ("EPSILON", config.optimizer.epsilon),
+            ("L2", config.optimizer.l2),
+        ];
+        let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
+        source
+            .constant("BACKGROUND", vec3(config.background.solid()))
+            .constant("BOX_MIN", vec3(needs.box_min))
+            .constant("BOX_MAX", vec3(needs.box_max))
+    }
+
+    fn lens(&self) -> Part {
+        if self.needs.lens { part!("lens/opencv.wgsl") } else { part!("lens/pinhole.wgsl") }
+    }
+
+    fn stepping(&self) -> Part {
+        if self.needs.cascades > 1 { part!("stepping/cone.wgsl") } else { part!("stepping/uniform.wgsl") }
+    }
+
+    fn pixels(&self) -> Part {
+        if self.needs.hdr { part!("pixels/linear.wgsl") } else { part!("pixels/srgb8.wgsl") }
+    }
+
+    fn activation(&self) -> Part {
+        if self.needs.hdr { part!("activation/exponential.wgsl") } else { part!("activation/sigmoid.wgsl") }
+    }
+
+    fn background(&self) -> Part {
+        match self.config.background {
+            Background::Random => part!("background/random.wgsl"),
+            _ => part!("background/solid.wgsl"),
+        }
+    }
+
+    fn transmittance(&self) -> Part {
+        match self.config.transmittance {
+            Transmittance::Exclusive => part!("transmittance/exclusive.wgsl"),
+            Transmittance::Inclusive => part!("transmittance/inclusive.wgsl"),
+        }
+    }
+
+    fn gradient(&self) -> Part {
+        match self.accumulation {
+            Accumulation::Fixed => part!("gradient/fixed.wgsl"),
+            Accumulation::Float => part!("gradient/float.wgsl"),
+            Accumulation::Auto | Accumulation::Exchange => part!("gradient/exchange.wgsl"),
+        }
+    }
+}
+
+fn vec3(value: [f32; 3]) -> impl Display {
+    let [x, y, z] = value;
+    format!("vec3<f32>({x:?}, {y:?}, {z:?})")
+}
+
+/// Buffers by name: what kernels are bound to.
+#[derive(Clone, Debug, Default)]
+pub struct Workspace {
+    buffers: Vec<Buffer>,
+}
+
+impl Workspace {
+    /// Adds a buffer; its name must be new.
+    pub fn add(&mut self, buffer: Buffer) {
+        debug_assert!(self.find(buffer.name).is_none(), "two buffers named {}", buffer.name);
+        self.buffers.push(buffer);
+    }
+
+    fn find(&self, name: &str) -> Option<&Buffer> {
+        self.buffers.iter().find(|buffer| buffer.name == name)
+    }
+
+    /// The buffer `name`.
+    ///
+    /// # Panics
+    /// When there is none: names are fixed in this module and its children.
+    #[must_use]
+    pub fn get(&self, name: &str) -> &Buffer {
+        self.find(name).unwrap_or_else(|| unreachable!("no buffer named '{name}'"))
+    }
+
+    /// Binds `kernel` to the buffers of the names it uses; `renamed` pairs a WGSL name with a buffer's.
+    ///
+    /// # Errors
+    /// When one is missing.
+    pub fn bind(&self, gpu: &Gpu, kernel: &Kernel, renamed: &[(&str, &str)]) -> Result<Bound> {
+        self.bind_with(gpu, kernel, renamed, &[])
+    }
+
+    /// As [`Workspace::bind`], with further resources.
+    ///
+    /// # Errors
+    /// When one is missing.
+    pub fn bind_with(
+        &self,
+        gpu: &Gpu,
+        kernel: &Kernel,
+        renamed: &[(&str, &str)],
+        further: &[Resource<'_>],
+    ) -> Result<Bound> {
+        let mut resources = further.to_vec();
+        resources.extend(renamed.iter().map(|(name, buffer)| self.get(buffer).named(name)));
+        resources.extend(self.buffers.iter().map(Buffer::resource));
+        kernel.bind(gpu, &resources)
+    }
+
+    /// Bytes of all buffers.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.buffers.iter().map(|buffer| buffer.raw.size()).sum()
+    }
+}
+
+impl Camera {
+    /// `camera` in the space where the scene's box is the unit cube; its pixels start at `first_texel`.
+    #[must_use]
+    pub fn in_box(camera: &crate::camera::Camera, bounds: &crate::dataset::Bounds, first_texel: u32) -> Self {
+        let pose = camera.world_from_camera;
+        let side = 2.0 * bounds.outer_half();
+        let axis = |axis: glam::DVec3| axis.normalize_or_zero().as_vec3().to_array();
+        let (radial, tangential) = match camera.lens {
+            crate::camera::Lens::Pinhole => ([0.0; 4], [0.0; 2]),
+            crate::camera::Lens::OpenCv { k, p } => (k, p),
+        };
+        Self {
+            origin: ((pose.translation - bounds.min()) / side).as_vec3().to_array(),
+            width: camera.width,
+            right: axis(pose.matrix3.x_axis),
+            height: camera.height,
+            up: axis(pose.matrix3.y_axis),
+            first_texel,
+            back: axis(pose.matrix3.z_axis),
+            focal_px: camera.focal_px.as_vec2().to_array(),
+            center_px: camera.center_px.as_vec2().to_array(),
+            radial: radial.map(|k| k as f32),
+            tangential: tangential.map(|p| p as f32),
+            ..Self::default()
+        }
+    }
+}

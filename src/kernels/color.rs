@@ -1,0 +1,93 @@
+//! Choosing the samples that matter, and the colour network over them.
+
+use super::density::{forward, layer_stage};
+use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
+use super::{COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, Plan, RANDOM, RAY, STEP, Workspace, dispatch};
+use crate::gpu::Gpu;
+use crate::gpu::pass::{Size, Stage};
+use crate::model::COLOR_INPUTS;
+use anyhow::Result;
+
+/// Names of the activations behind each hidden layer of the colour network.
+pub const COLOR_HIDDEN: [&str; 4] = ["color_hidden_1", "color_hidden_2", "color_hidden_3", "color_hidden_4"];
+
+/// How many samples get colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Selection {
+    /// Those above the weight floor, and some of the others.
+    Training,
+    /// All in front of the point where the ray is opaque.
+    All,
+}
+
+/// Allocates the kept samples and the colour network's activations.
+///
+/// # Errors
+/// When the adapter cannot hold them.
+pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+    let rows = kept_capacity(plan) + SPARE_ROWS;
+    workspace.add(gpu.storage::<[u32; 2]>("chosen", plan.config.batch.samples)?);
+    workspace.add(gpu.storage::<u32>("kept_sample", rows)?);
+    workspace.add(gpu.storage::<u32>("kept_ray", rows)?);
+    workspace.add(gpu.storage::<f32>("kept_gain", rows)?);
+    workspace.add(gpu.storage::<[f32; 2]>("kept_steps", rows)?);
+    workspace.add(gpu.storage::<f32>("color_input", rows * COLOR_INPUTS)?);
+    for name in COLOR_HIDDEN.iter().take(plan.config.network.color_layers) {
+        workspace.add(gpu.storage::<f32>(name, rows * plan.config.network.width)?);
+    }
+    workspace.add(gpu.storage::<[f32; 4]>("color", rows)?);
+    Ok(())
+}
+
+/// Selects, packs and colours.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
+    let floor = match selection {
+        Selection::Training => plan.config.selection.weight_floor as f32,
+        Selection::All => 0.0,
+    };
+    let select = plan.generated_kernel(
+        gpu,
+        "select",
+        &[RANDOM, STEP, COUNTERS, EXP, DENSITY, part!("select.wgsl")],
+        &[],
+        format!("const WEIGHT_FLOOR = f32({floor:?});"),
+    )?;
+    let kept = plan.kernel(gpu, "kept", &[COUNTERS, DENSITY, part!("kept.wgsl")])?;
+    let input = plan.kernel(gpu, "color input", &[COUNTERS, RAY, HARMONICS, part!("color_input.wgsl")])?;
+    let sizes = workspace.get("dispatch");
+    let mut stages = vec![
+        Stage::indirect(workspace.bind(gpu, &select, &[])?, sizes, dispatch::RAYS),
+        scan(gpu, plan, workspace, Scanned::Kept)?,
+        Stage::indirect(workspace.bind(gpu, &kept, &[])?, sizes, dispatch::RAYS),
+        Stage::indirect(workspace.bind(gpu, &input, &[])?, sizes, dispatch::KEPT),
+    ];
+    stages.extend(network(gpu, plan, workspace)?);
+    Ok(stages)
+}
+
+/// The colour network's layers.
+fn network(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    let layers = &plan.layout.color;
+    let last = layers.len() - 1;
+    let mut source = "color_input";
+    let mut stages = Vec::new();
+    for (number, layer) in layers.iter().enumerate() {
+        let label = format!("color {number}");
+        let input = part!("layer/input.wgsl");
+        let size = Size::Indirect(workspace.get("dispatch").clone(), dispatch::KEPT_TILES);
+        let (parts, output) = if number == last {
+            let store = part!("layer/store_color.wgsl");
+            (vec![COUNTERS, COUNT_KEPT, EXP, plan.activation(), input, store], "color")
+        } else {
+            (vec![COUNTERS, COUNT_KEPT, input, part!("layer/store_hidden.wgsl")], COLOR_HIDDEN[number])
+        };
+        let kernel = forward(gpu, plan, &label, layer, &parts)?;
+        let renamed = [("layer_input", source), ("layer_output", output)];
+        stages.push(layer_stage(gpu, workspace, &kernel, layer, &renamed, size)?);
+        source = output;
+    }
+    Ok(stages)
+}

@@ -1,0 +1,109 @@
+//! The density network over all marched samples: encoding and two layers.
+
+use super::marching::SPARE_ROWS;
+use super::{COUNT_SAMPLES, COUNTERS, GRID, Plan, Workspace, dispatch, layer};
+use crate::gpu::Gpu;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::kernel::{Kernel, Resource};
+use crate::gpu::pass::{Size, Stage};
+use crate::model::{DENSITY_OUTPUTS, Layer};
+use anyhow::Result;
+
+/// Allocates the activations of the marched samples.
+///
+/// # Errors
+/// When the adapter cannot hold them.
+pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+    let rows = plan.config.batch.samples + SPARE_ROWS;
+    workspace.add(gpu.storage::<f32>("encoding", rows * plan.layout.encoding())?);
+    workspace.add(gpu.storage::<f32>("density_hidden", rows * plan.config.network.width)?);
+    workspace.add(gpu.storage::<f32>("density_out", rows * DENSITY_OUTPUTS)?);
+    Ok(())
+}
+
+/// Allocates the parameters: table, weights and the levels' description.
+///
+/// # Errors
+/// When the adapter cannot hold them.
+pub fn allocate_parameters(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+    let levels = gpu.uniform_storage::<crate::model::Level>("levels", plan.layout.levels.len())?;
+    gpu.write(&levels, 0, &plan.layout.levels);
+    workspace.add(levels);
+    workspace.add(gpu.storage::<[f32; 2]>("table", plan.layout.entries)?);
+    workspace.add(gpu.uniform_storage::<[f32; 4]>("mlp", plan.layout.quads)?);
+    workspace.add(gpu.storage::<f32>("occupancy", plan.cell_count())?);
+    workspace.add(gpu.storage::<u32>("occupancy_bits", plan.cell_count() / 32)?);
+    Ok(())
+}
+
+/// Encodes the samples and runs the density network on them.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    let encode = plan.kernel(gpu, "encode", &[COUNTERS, GRID, part!("encode.wgsl")])?;
+    let sizes = workspace.get("dispatch");
+    let hidden = forward(gpu, plan, "density hidden", &plan.layout.density[0], &FORWARD_HIDDEN)?;
+    let out = forward(gpu, plan, "density out", &plan.layout.density[1], &FORWARD_LINEAR)?;
+    let tiles = Size::Indirect(sizes.clone(), dispatch::SAMPLE_TILES);
+    Ok(vec![
+        Stage::indirect(workspace.bind(gpu, &encode, &[])?, sizes, dispatch::SAMPLES),
+        layer_stage(
+            gpu,
+            workspace,
+            &hidden,
+            &plan.layout.density[0],
+            &[("layer_input", "encoding"), ("layer_output", "density_hidden")],
+            tiles.clone(),
+        )?,
+        layer_stage(
+            gpu,
+            workspace,
+            &out,
+            &plan.layout.density[1],
+            &[("layer_input", "density_hidden"), ("layer_output", "density_out")],
+            tiles,
+        )?,
+    ])
+}
+
+const FORWARD_HIDDEN: [super::Part; 4] =
+    [COUNTERS, COUNT_SAMPLES, part!("layer/input.wgsl"), part!("layer/store_hidden.wgsl")];
+const FORWARD_LINEAR: [super::Part; 4] =
+    [COUNTERS, COUNT_SAMPLES, part!("layer/input.wgsl"), part!("layer/store_linear.wgsl")];
+
+/// The kernel of a forward layer.
+///
+/// # Errors
+/// When it cannot be built.
+pub fn forward(gpu: &Gpu, plan: &Plan, label: &str, layer: &Layer, parts: &[super::Part]) -> Result<Kernel> {
+    let text = layer::forward(layer.inputs, layer.outputs, plan.samples_per_thread);
+    plan.generated_kernel(gpu, label, parts, &quads(layer), text)
+}
+
+/// The constants of a layer's shape.
+#[must_use]
+pub fn quads(layer: &Layer) -> [(&'static str, usize); 2] {
+    [("INPUT_QUADS", layer.inputs / 4), ("OUTPUT_QUADS", layer.outputs / 4)]
+}
+
+/// A layer's kernel bound to its weights and to the `renamed` buffers.
+///
+/// # Errors
+/// When a buffer is missing.
+pub fn layer_stage(
+    gpu: &Gpu,
+    workspace: &Workspace,
+    kernel: &Kernel,
+    layer: &Layer,
+    renamed: &[(&str, &str)],
+    size: Size,
+) -> Result<Stage> {
+    let weights = weights(workspace.get("mlp"), layer);
+    Ok(Stage { bound: workspace.bind_with(gpu, kernel, renamed, &[weights])?, size })
+}
+
+fn weights<'a>(mlp: &'a Buffer, layer: &Layer) -> Resource<'a> {
+    let range = ((layer.first_quad * 16) as u64, (layer.quads() * 16) as u64);
+    Resource { name: "layer_weights", buffer: mlp, range: Some(range) }
+}

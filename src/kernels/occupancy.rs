@@ -1,0 +1,68 @@
+//! Refreshing the occupancy grid from the density network.
+
+use super::{COUNTERS, DENSITY, EXP, OCCUPANCY, Plan, RANDOM, STEP, Workspace, density};
+use crate::gpu::Gpu;
+use crate::gpu::pass::{Size, Stage};
+use anyhow::Result;
+
+/// The stages of an update: `chunk` runs once per chunk of cells, `bits` once at the end.
+#[derive(Debug)]
+pub struct Update {
+    chunk: Vec<Stage>,
+    bits: Vec<Stage>,
+    samples_per_thread: usize,
+}
+
+/// Allocates what only the update needs.
+///
+/// # Errors
+/// When the adapter cannot hold it.
+pub fn allocate(gpu: &Gpu, workspace: &mut Workspace) -> Result<()> {
+    workspace.add(gpu.storage::<f32>("occupancy_mean", 1)?);
+    Ok(())
+}
+
+impl Update {
+    /// Builds the stages.
+    ///
+    /// # Errors
+    /// When a kernel cannot be built.
+    pub fn new(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Self> {
+        let parts = [RANDOM, STEP, COUNTERS, OCCUPANCY, part!("occupancy_samples.wgsl")];
+        let samples = plan.kernel(gpu, "occupancy samples", &parts)?;
+        let update =
+            plan.kernel(gpu, "occupancy update", &[STEP, EXP, DENSITY, part!("occupancy_update.wgsl")])?;
+        let mean = plan.kernel(gpu, "occupancy mean", &[part!("occupancy_mean.wgsl")])?;
+        let bits = plan.kernel(gpu, "occupancy bits", &[part!("occupancy_bits.wgsl")])?;
+        let mut chunk = vec![Stage::fixed(workspace.bind(gpu, &samples, &[])?, 1, 1)];
+        chunk.extend(density::stages(gpu, plan, workspace)?);
+        chunk.push(Stage::fixed(workspace.bind(gpu, &update, &[])?, 1, 1));
+        let words = plan.cell_count() / 32;
+        Ok(Self {
+            chunk,
+            bits: vec![
+                Stage::fixed(workspace.bind(gpu, &mean, &[])?, 1, 1),
+                Stage::fixed(workspace.bind(gpu, &bits, &[])?, words.div_ceil(64), 1),
+            ],
+            samples_per_thread: plan.samples_per_thread,
+        })
+    }
+
+    /// The stages for a chunk of `cells` cells.
+    pub fn chunk(&mut self, cells: usize) -> &[Stage] {
+        let last = self.chunk.len() - 1;
+        for (index, stage) in self.chunk.iter_mut().enumerate() {
+            let layer = index == 2 || index == 3;
+            let per_group = if layer { 64 * self.samples_per_thread } else { 64 };
+            debug_assert!(index <= last);
+            stage.size = Size::Fixed(cells.div_ceil(per_group) as u32, 1);
+        }
+        &self.chunk
+    }
+
+    /// The stages that turn values into bits.
+    #[must_use]
+    pub fn bits(&self) -> &[Stage] {
+        &self.bits
+    }
+}

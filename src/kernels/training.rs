@@ -1,0 +1,234 @@
+//! What only training needs: rays with targets, the fused kernel, the backward pass and the optimiser.
+
+use super::color::COLOR_HIDDEN;
+use super::density::{layer_stage, quads};
+use super::marching::{SPARE_ROWS, kept_capacity};
+use super::{
+    ADAM, CAMERA, CHUNKS, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, STEP, Workspace,
+    dispatch, layer,
+};
+use crate::config::Accumulation;
+use crate::gpu::Gpu;
+use crate::gpu::pass::{Size, Stage};
+use crate::gpu_struct;
+use crate::model::{DENSITY_OUTPUTS, FEATURES, Layer};
+use anyhow::Result;
+
+gpu_struct! {
+    /// The shape of a layer whose weight gradient is summed; see `shaders/layer/tile.wgsl`.
+    Tile {
+        /// Quads per row of inputs.
+        input_quads: u32,
+        /// Quads per row of gradients.
+        output_quads: u32,
+        /// Tiles along the inputs.
+        input_tiles: u32,
+        /// Tiles along the outputs.
+        output_tiles: u32,
+        /// First quad in the weight buffer.
+        first_quad: u32,
+        /// 1 when the inputs lie in the order of all marched samples.
+        of_samples: u32,
+        /// Padding.
+        unused_1: u32,
+        /// Padding.
+        unused_2: u32,
+    }
+}
+
+/// Names of the gradients in front of each hidden layer's ReLU in the colour network.
+const D_COLOR_HIDDEN: [&str; 4] =
+    ["d_color_hidden_1", "d_color_hidden_2", "d_color_hidden_3", "d_color_hidden_4"];
+
+/// Allocates targets, gradients and moments.
+///
+/// # Errors
+/// When the adapter cannot hold them.
+pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+    let (batch, layout) = (&plan.config.batch, &plan.layout);
+    let rows = kept_capacity(plan) + SPARE_ROWS;
+    let width = plan.config.network.width;
+    for name in ["targets", "backgrounds", "rendered", "ray_errors"] {
+        workspace.add(gpu.storage::<[f32; 4]>(name, batch.rays)?);
+    }
+    for name in ["d_color", "d_raw_color"] {
+        workspace.add(gpu.storage::<[f32; 4]>(name, rows)?);
+    }
+    for name in D_COLOR_HIDDEN.iter().take(plan.config.network.color_layers) {
+        workspace.add(gpu.storage::<f32>(name, rows * width)?);
+    }
+    workspace.add(gpu.storage::<f32>("d_density_out", rows * DENSITY_OUTPUTS)?);
+    workspace.add(gpu.storage::<f32>("d_density_hidden", rows * width)?);
+    workspace.add(gpu.storage::<f32>("d_encoding", rows * layout.encoding())?);
+    workspace.add(gpu.storage::<[f32; 4]>("d_weight_chunks", CHUNKS * layout.quads)?);
+    workspace.add(gpu.storage::<[f32; FEATURES]>("d_table", layout.entries)?);
+    for name in ["table_first", "table_second"] {
+        workspace.add(gpu.storage::<[f32; FEATURES]>(name, layout.entries)?);
+    }
+    for name in ["mlp_first", "mlp_second"] {
+        workspace.add(gpu.storage::<[f32; 4]>(name, layout.quads)?);
+    }
+    Ok(())
+}
+
+/// Draws the rays of a step.
+///
+/// # Errors
+/// When the kernel cannot be built.
+pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
+    let parts = [
+        RANDOM,
+        STEP,
+        COUNTERS,
+        RAY,
+        CAMERA,
+        plan.lens(),
+        plan.pixels(),
+        plan.background(),
+        part!("rays.wgsl"),
+    ];
+    let kernel = plan.kernel(gpu, "rays", &parts)?;
+    Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
+}
+
+/// The fused render, loss and gradient kernel.
+///
+/// # Errors
+/// When the kernel cannot be built.
+pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -> Result<Stage> {
+    let weights = if weights { part!("weights/stored.wgsl") } else { part!("weights/none.wgsl") };
+    let parts = [COUNTERS, EXP, plan.transmittance(), weights, part!("composite.wgsl")];
+    let kernel = plan.kernel(gpu, "composite", &parts)?;
+    Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
+}
+
+/// Gradients of all activations, from the colour back to the encoding.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn backward(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    let gradient = part!("layer/gradient.wgsl");
+    let last = plan.layout.color.len() - 1;
+    let mut stages = Vec::new();
+    for (number, layer) in plan.layout.color.iter().enumerate().rev() {
+        let mut parts = vec![COUNTERS, COUNT_KEPT];
+        if number == last {
+            parts.extend([EXP, plan.activation(), part!("layer/gradient_color.wgsl")]);
+        } else {
+            parts.push(gradient);
+        }
+        let (wanted, input, d_input) = if number == 0 {
+            parts.extend([DENSITY, part!("layer/d_features.wgsl")]);
+            (DENSITY_OUTPUTS, "color_input", "d_density_out")
+        } else {
+            parts.push(part!("layer/d_hidden.wgsl"));
+            (layer.inputs, COLOR_HIDDEN[number - 1], D_COLOR_HIDDEN[number - 1])
+        };
+        let d_output = if number == last { "d_raw_color" } else { D_COLOR_HIDDEN[number] };
+        let renamed = [("layer_input", input), ("d_input", d_input), ("d_output", d_output)];
+        let label = format!("d color {number}");
+        stages.push(backward_layer(gpu, plan, workspace, (&label, layer, wanted), &parts, &renamed)?);
+    }
+    let [hidden, out] = [&plan.layout.density[0], &plan.layout.density[1]];
+    let parts = [COUNTERS, COUNT_KEPT, gradient, part!("layer/d_hidden_of_sample.wgsl")];
+    let renamed =
+        [("layer_input", "density_hidden"), ("d_input", "d_density_hidden"), ("d_output", "d_density_out")];
+    stages.push(backward_layer(gpu, plan, workspace, ("d density out", out, out.inputs), &parts, &renamed)?);
+    let parts = [COUNTERS, COUNT_KEPT, gradient, part!("layer/d_linear.wgsl")];
+    let renamed = [("d_input", "d_encoding"), ("d_output", "d_density_hidden")];
+    let shape = ("d density hidden", hidden, hidden.inputs);
+    stages.push(backward_layer(gpu, plan, workspace, shape, &parts, &renamed)?);
+    Ok(stages)
+}
+
+fn backward_layer(
+    gpu: &Gpu,
+    plan: &Plan,
+    workspace: &Workspace,
+    (label, shape, wanted): (&str, &Layer, usize),
+    parts: &[Part],
+    renamed: &[(&str, &str)],
+) -> Result<Stage> {
+    let text = layer::backward(shape.inputs, wanted, shape.outputs, plan.samples_per_thread);
+    let kernel = plan.generated_kernel(gpu, label, parts, &quads(shape), text)?;
+    let size = Size::Indirect(workspace.get("dispatch").clone(), dispatch::KEPT_TILES);
+    layer_stage(gpu, workspace, &kernel, shape, renamed, size)
+}
+
+/// Gradients of all weights.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn weight_gradients(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    let tile_kernel = |quads: usize| {
+        let numbers = [("TILE_INPUT_QUADS", layer::TILE_INPUTS / 4), ("TILE_OUTPUT_QUADS", quads)];
+        let parts = [COUNTERS, COUNT_KEPT, part!("layer/tile.wgsl")];
+        let label = format!("d weights {quads}");
+        plan.generated_kernel(gpu, &label, &parts, &numbers, layer::weight_gradient(quads))
+    };
+    let (wide, narrow) = (tile_kernel(4)?, tile_kernel(1)?);
+    let mut jobs = vec![
+        (&plan.layout.density[0], "encoding", "d_density_hidden", true),
+        (&plan.layout.density[1], "density_hidden", "d_density_out", true),
+    ];
+    let last = plan.layout.color.len() - 1;
+    for (number, shape) in plan.layout.color.iter().enumerate() {
+        let input = if number == 0 { "color_input" } else { COLOR_HIDDEN[number - 1] };
+        let d_output = if number == last { "d_raw_color" } else { D_COLOR_HIDDEN[number] };
+        jobs.push((shape, input, d_output, false));
+    }
+    jobs.into_iter()
+        .map(|(shape, input, d_output, of_samples)| {
+            let quads = if shape.outputs == 4 { 1 } else { 4 };
+            let kernel = if quads == 1 { &narrow } else { &wide };
+            let tile = Tile {
+                input_quads: (shape.inputs / 4) as u32,
+                output_quads: (shape.outputs / 4) as u32,
+                input_tiles: (shape.inputs / layer::TILE_INPUTS) as u32,
+                output_tiles: (shape.outputs / 4 / quads) as u32,
+                first_quad: shape.first_quad as u32,
+                of_samples: u32::from(of_samples),
+                ..Tile::default()
+            };
+            let uniform = gpu.uniform("tile", &tile)?;
+            let renamed = [("layer_input", input), ("d_output", d_output)];
+            let bound = workspace.bind_with(gpu, kernel, &renamed, &[uniform.resource()])?;
+            let threads = (tile.input_tiles * tile.output_tiles) as usize * CHUNKS;
+            Ok(Stage::fixed(bound, threads.div_ceil(8), 1))
+        })
+        .collect()
+}
+
+/// Scatters into the table, updates all parameters and ends the step.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    let gradient = plan.gradient();
+    let scatter = plan.kernel(gpu, "scatter", &[COUNTERS, GRID, gradient, part!("scatter.wgsl")])?;
+    let table =
+        plan.kernel(gpu, "adam table", &[STEP, COUNTERS, ADAM, gradient, part!("adam_table.wgsl")])?;
+    let mlp = plan.kernel(gpu, "adam mlp", &[STEP, ADAM, part!("adam_mlp.wgsl")])?;
+    let finish = plan.kernel(gpu, "finish", &[COUNTERS, part!("finish.wgsl")])?;
+    let sizes = workspace.get("dispatch");
+    Ok(vec![
+        Stage::indirect(workspace.bind(gpu, &scatter, &[])?, sizes, dispatch::KEPT),
+        Stage::fixed(workspace.bind(gpu, &table, &[])?, plan.layout.entries.div_ceil(128), 1),
+        Stage::fixed(workspace.bind(gpu, &mlp, &[])?, plan.layout.quads.div_ceil(8), 1),
+        Stage::fixed(workspace.bind(gpu, &finish, &[])?, 1, 1),
+    ])
+}
+
+/// Names of the buffers that hold the state of a training, apart from the counters.
+pub const STATE: [&str; 7] =
+    ["table", "table_first", "table_second", "mlp", "mlp_first", "mlp_second", "occupancy"];
+
+/// Describes how the table's gradients are summed.
+#[must_use]
+pub fn accumulation_name(accumulation: Accumulation) -> &'static str {
+    match accumulation {
+        Accumulation::Fixed => "fixed-point gradients",
+        Accumulation::Float => "float-atomic gradients",
+        Accumulation::Auto | Accumulation::Exchange => "compare-exchange gradients",
+    }
+}

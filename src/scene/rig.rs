@@ -1,0 +1,189 @@
+//! Where the cameras of a generated dataset stand and what their lenses are.
+
+use super::{Generate, Scene};
+use crate::camera::{Camera, Lens};
+use glam::{DAffine3, DMat3, DVec2, DVec3, dvec2, dvec3};
+use std::f64::consts::TAU;
+
+/// Horizontal field of view of the bounded scenes.
+pub(super) const ORBIT_FOV_RAD: f64 = 40.0 * TAU / 360.0;
+
+/// Distance of the cameras of the bounded scenes from the origin.
+const ORBIT_RADIUS: f64 = 4.0;
+
+/// The dataset's splits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Split {
+    Train,
+    Val,
+    Test,
+}
+
+impl Split {
+    pub(super) const ALL: [Self; 3] = [Self::Train, Self::Val, Self::Test];
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Val => "val",
+            Self::Test => "test",
+        }
+    }
+
+    /// How many views `options` want of it.
+    pub(super) fn views(self, options: &Generate) -> usize {
+        match self {
+            Self::Train => options.views.train,
+            Self::Val => options.views.val,
+            Self::Test => options.views.test,
+        }
+    }
+}
+
+/// The camera of view `index` of a split.
+pub(super) fn camera(scene: &Scene, options: &Generate, split: Split, index: usize) -> Camera {
+    let mut random = Random::new(options.seed, split);
+    let (width, height) = options.size;
+    let (w, h) = (f64::from(width), f64::from(height));
+    if scene.is_opaque() {
+        let focal = 0.75 * w.max(h);
+        return Camera {
+            width,
+            height,
+            focal_px: dvec2(focal, 1.004 * focal),
+            center_px: dvec2(0.512 * w, 0.489 * h),
+            lens: lens(options.lens),
+            world_from_camera: handheld(&mut random, index, split.views(options)),
+        };
+    }
+    Camera {
+        width,
+        height,
+        focal_px: DVec2::splat(0.5 * w / (0.5 * ORBIT_FOV_RAD).tan()),
+        center_px: dvec2(0.5 * w, 0.5 * h),
+        lens: Lens::Pinhole,
+        world_from_camera: orbit(&mut random, index),
+    }
+}
+
+/// A wide-angle barrel distortion, invertible over the whole image.
+fn lens(distorted: bool) -> Lens {
+    if distorted { Lens::OpenCv { k: [-0.11, 0.02, 0.0, 0.0], p: [0.0012, -0.0008] } } else { Lens::Pinhole }
+}
+
+/// Evenly spread over the sphere without its poles, looking at the origin: the R2 sequence from a random start,
+/// so that any run of consecutive views is spread too.
+fn orbit(random: &mut Random, index: usize) -> DAffine3 {
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    let step = index as f64;
+    let angle = TAU * (random.unit() + step / PLASTIC).fract();
+    let lift = (random.unit() + step / (PLASTIC * PLASTIC)).fract();
+    let up = -0.55 + 1.5 * lift;
+    let flat = (1.0 - up * up).sqrt();
+    look_at(ORBIT_RADIUS * dvec3(flat * angle.cos(), flat * angle.sin(), up), DVec3::ZERO, 0.0)
+}
+
+/// A walk around the middle with a swaying hand: distance, height, aim and roll vary.
+fn handheld(random: &mut Random, index: usize, count: usize) -> DAffine3 {
+    let start = random.unit();
+    random.skip(index);
+    let mut sway = |size: f64| size * (2.0 * random.unit() - 1.0);
+    let angle = TAU * (start + (index as f64 + 0.3 * sway(1.0)) / count as f64);
+    let distance = 2.55 + sway(0.3);
+    let height = 1.2 + 0.35 * (3.0 * angle).sin() + sway(0.25);
+    let eye = dvec3(distance * angle.cos(), distance * angle.sin(), height);
+    let aim = dvec3(sway(0.25), sway(0.25), 0.68 + sway(0.15));
+    look_at(eye, aim, sway(0.05))
+}
+
+/// The pose at `eye` looking at `target`, rolled clockwise by `roll_rad`; z is up in the world.
+fn look_at(eye: DVec3, target: DVec3, roll_rad: f64) -> DAffine3 {
+    let back = (eye - target).normalize();
+    let right = DVec3::Z.cross(back).normalize();
+    let up = back.cross(right);
+    let (sin, cos) = roll_rad.sin_cos();
+    let axes = DMat3::from_cols(cos * right - sin * up, sin * right + cos * up, back);
+    DAffine3::from_mat3_translation(axes, eye)
+}
+
+/// The SplitMix64 generator, one stream per seed and split.
+struct Random {
+    state: u64,
+}
+
+impl Random {
+    const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
+
+    fn new(seed: u64, split: Split) -> Self {
+        let mut random = Self { state: seed ^ (split as u64 + 1).rotate_left(61) };
+        random.state = random.bits();
+        random
+    }
+
+    /// Moves to the numbers of view `index`.
+    fn skip(&mut self, index: usize) {
+        self.state = self.state.wrapping_add(Self::STEP.wrapping_mul(16 * (index as u64 + 1)));
+    }
+
+    fn bits(&mut self) -> u64 {
+        self.state = self.state.wrapping_add(Self::STEP);
+        let mut z = self.state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in `[0, 1)`.
+    fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Views;
+    use super::*;
+
+    fn cameras(scene: &str, split: Split) -> Vec<Camera> {
+        let options = Generate { views: Views { train: 40, val: 5, test: 9 }, ..Generate::new(scene) };
+        let scene = Scene::named(scene).expect("a known scene");
+        (0..split.views(&options)).map(|i| camera(&scene, &options, split, i)).collect()
+    }
+
+    #[test]
+    fn poses_are_rotations() {
+        for scene in ["toys", "courtyard"] {
+            for camera in cameras(scene, Split::Train) {
+                let axes = camera.world_from_camera.matrix3;
+                assert!((axes.determinant() - 1.0).abs() < 1e-12);
+                assert!((axes * axes.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-12));
+            }
+        }
+    }
+
+    #[test]
+    fn orbits_look_at_the_origin_from_above_and_below() {
+        let cameras = cameras("toys", Split::Train);
+        for camera in &cameras {
+            let pose = camera.world_from_camera;
+            assert!((pose.translation.length() - ORBIT_RADIUS).abs() < 1e-12);
+            assert!(pose.translation.normalize().abs_diff_eq(pose.matrix3.z_axis, 1e-12));
+        }
+        let heights = || cameras.iter().map(|camera| camera.world_from_camera.translation.z);
+        assert!(heights().any(|z| z < -1.5) && heights().any(|z| z > 3.0));
+    }
+
+    #[test]
+    fn splits_and_seeds_differ() {
+        for scene in ["toys", "courtyard"] {
+            let [train, val, test] = Split::ALL.map(|split| cameras(scene, split));
+            for camera in val.iter().chain(&test) {
+                let eye = camera.world_from_camera.translation;
+                let apart = |other: &Camera| other.world_from_camera.translation.distance(eye) > 1e-3;
+                assert!(train.iter().all(apart));
+            }
+        }
+        let eye = |seed| orbit(&mut Random::new(seed, Split::Train), 0).translation;
+        assert!(eye(0).distance(eye(1)) > 1e-3);
+    }
+}

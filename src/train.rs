@@ -1,0 +1,323 @@
+//! The trainer: owns the field's parameters on the device and takes steps.
+//!
+//! It knows neither files nor progress bars: a step is a list of dispatches, and [`Trainer::report`] says
+//! what happened since the last report.
+
+use crate::camera::Camera;
+use crate::dataset::Bounds;
+use crate::gpu::Gpu;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::pass::Stage;
+use crate::gpu::timer::Timer;
+use crate::image::{Image, Pixels};
+use crate::kernels::{self, Counters, Plan, Step, Workspace, color, density, marching, occupancy, training};
+use crate::model::pcg;
+use anyhow::{Result, bail};
+use std::sync::Arc;
+
+/// Trains one field on one device.
+#[derive(Debug)]
+pub struct Trainer {
+    gpu: Arc<Gpu>,
+    plan: Plan,
+    workspace: Workspace,
+    stages: Vec<Stage>,
+    occupancy: occupancy::Update,
+    step: u32,
+    /// What every cell of the occupancy grid starts from: 0, or -1 where no camera sees it.
+    first_occupancy: Vec<f32>,
+}
+
+/// What happened in the steps since the last report, per step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepStats {
+    /// Steps reported.
+    pub steps: u32,
+    /// Rays of all of them.
+    pub rays: u64,
+    /// Marched samples of all of them.
+    pub marched: u64,
+    /// Samples with colour and gradients of all of them.
+    pub samples: u64,
+    /// Mean loss.
+    pub loss: f64,
+    /// Mean squared error of the colour.
+    pub color_error: f64,
+}
+
+/// Everything that a training needs to go on as if it had never stopped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Steps taken.
+    pub step: u32,
+    /// Rays of the next step.
+    pub rays: u32,
+    /// The buffers of [`training::STATE`], in that order.
+    pub buffers: Vec<Vec<f32>>,
+    /// One bit per occupied cell.
+    pub occupancy_bits: Vec<u32>,
+}
+
+/// The training views.
+#[derive(Clone, Copy, Debug)]
+pub struct Views<'a> {
+    /// Their cameras, in world space.
+    pub cameras: &'a [Camera],
+    /// Their images, of the cameras' sizes.
+    pub images: &'a [Image],
+    /// The scene's box.
+    pub bounds: &'a Bounds,
+}
+
+impl Trainer {
+    /// Allocates, uploads and builds every kernel; parameters start from the configuration's seed.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold the images, the table or the batch, or refuses a kernel.
+    pub fn new(gpu: &Arc<Gpu>, plan: Plan, views: &Views<'_>) -> Result<Self> {
+        let mut workspace = Workspace::default();
+        marching::allocate(gpu, &plan, &mut workspace)?;
+        density::allocate_parameters(gpu, &plan, &mut workspace)?;
+        density::allocate(gpu, &plan, &mut workspace)?;
+        color::allocate(gpu, &plan, &mut workspace)?;
+        training::allocate(gpu, &plan, &mut workspace)?;
+        occupancy::allocate(gpu, &mut workspace)?;
+        upload(gpu, views, &mut workspace)?;
+        let stages = step_stages(gpu, &plan, &workspace)?;
+        let occupancy = occupancy::Update::new(gpu, &plan, &workspace)?;
+        let first_occupancy = vec![0.0; plan.cell_count()];
+        let mut trainer =
+            Self { gpu: Arc::clone(gpu), plan, workspace, stages, occupancy, step: 0, first_occupancy };
+        trainer.reset()?;
+        Ok(trainer)
+    }
+
+    /// Takes the cells that no camera sees out of the field for good.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn exclude_cells(&mut self, unseen: &[bool]) -> Result<()> {
+        for (value, &unseen) in self.first_occupancy.iter_mut().zip(unseen) {
+            *value = if unseen { -1.0 } else { 0.0 };
+        }
+        self.reset()
+    }
+
+    /// Runs every kernel once, so that drivers that compile at the first dispatch have done so, and starts over.
+    ///
+    /// # Errors
+    /// When the device was lost or a kernel failed.
+    pub fn warm_up(&mut self) -> Result<()> {
+        self.step(0.0, None)?;
+        self.refresh_occupancy(true);
+        self.gpu.wait()?;
+        self.reset()
+    }
+
+    /// Back to the initial parameters and step 0.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn reset(&mut self) -> Result<()> {
+        let seed = self.plan.config.seed;
+        let layout = &self.plan.layout;
+        let zeros = |name| vec![0.0; self.workspace.get(name).raw.size() as usize / size_of::<f32>()];
+        let buffers = training::STATE
+            .iter()
+            .map(|&name| match name {
+                "table" => layout.initial_table(seed),
+                "mlp" => layout.initial_weights(seed),
+                "occupancy" => self.first_occupancy.clone(),
+                moments => zeros(moments),
+            })
+            .collect();
+        let rays = self.plan.config.batch.first_rays;
+        let bits = |cells: &[f32]| (0..32).fold(0, |word, bit| word | (u32::from(cells[bit] >= 0.0) << bit));
+        let occupancy_bits = self.first_occupancy.chunks_exact(32).map(bits).collect();
+        self.restore(&State { step: 0, rays, buffers, occupancy_bits })
+    }
+
+    /// Goes on from `state`.
+    ///
+    /// # Errors
+    /// When the state is of another layout, or the device was lost.
+    pub fn restore(&mut self, state: &State) -> Result<()> {
+        for (&name, data) in training::STATE.iter().zip(&state.buffers) {
+            let buffer = self.workspace.get(name);
+            let (expected, found) = (buffer.raw.size() as usize, size_of_val(data.as_slice()));
+            if found > expected || expected - found >= 16 {
+                bail!("the state's '{name}' has {found} bytes, and this configuration needs {expected}");
+            }
+            self.gpu.write(buffer, 0, data);
+        }
+        self.gpu.write(self.workspace.get("occupancy_bits"), 0, &state.occupancy_bits);
+        let counters = Counters { rays: state.rays, rays_used: 1, ..Counters::default() };
+        self.gpu.write(self.workspace.get("counters"), 0, &[counters]);
+        let groups = [[state.rays.div_ceil(64), 1, 1, 0]];
+        self.gpu.write(self.workspace.get("dispatch"), kernels::dispatch::RAYS, &groups);
+        let mut encoder = self.gpu.encoder("restore");
+        encoder.clear_buffer(&self.workspace.get("d_table").raw, 0, None);
+        self.gpu.submit(encoder);
+        self.step = state.step;
+        self.gpu.wait()
+    }
+
+    /// Everything a later [`Trainer::restore`] needs.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn state(&self) -> Result<State> {
+        let read = |name: &&str| {
+            let buffer = self.workspace.get(name);
+            self.gpu.read::<f32>(buffer, 0, buffer.raw.size() as usize / size_of::<f32>())
+        };
+        let buffers = training::STATE.iter().map(read).collect::<Result<_>>()?;
+        let bits = self.workspace.get("occupancy_bits");
+        Ok(State {
+            step: self.step,
+            rays: self.gpu.read::<Counters>(self.workspace.get("counters"), 0, 1)?[0].rays,
+            buffers,
+            occupancy_bits: self.gpu.read(bits, 0, self.plan.cell_count() / 32)?,
+        })
+    }
+
+    /// One step: refresh the occupancy grid when it is due, then rays → march → density → select → colour →
+    /// render·loss·gradient → backward → Adam. Submits and returns; [`Trainer::report`] waits.
+    ///
+    /// # Errors
+    /// When the device reported an error.
+    pub fn step(&mut self, learning_rate: f64, mut timer: Option<&mut Timer>) -> Result<()> {
+        let grid = &self.plan.config.occupancy;
+        if self.step > 0 && self.step.is_multiple_of(grid.interval) {
+            let all = self.step <= grid.warm_up;
+            self.refresh_occupancy(all);
+        }
+        self.step += 1;
+        let optimizer = &self.plan.config.optimizer;
+        let correction = |beta: f64| (1.0 / (1.0 - beta.powf(f64::from(self.step)))) as f32;
+        let step = Step {
+            stream: self.stream(),
+            learning_rate: learning_rate as f32,
+            first_correction: correction(optimizer.beta_1),
+            second_correction: correction(optimizer.beta_2),
+            ..Step::default()
+        };
+        self.gpu.write(self.workspace.get("step"), 0, &[step]);
+        self.gpu.run("step", &self.stages, timer.as_deref_mut());
+        if let Some(timer) = timer {
+            timer.collect(&self.gpu)?;
+        }
+        self.gpu.check()
+    }
+
+    /// Steps taken.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.step
+    }
+
+    /// The plan it was built from.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The buffers, for rendering and for checks.
+    #[must_use]
+    pub fn workspace(&self) -> &Workspace {
+        &self.workspace
+    }
+
+    /// Waits for the device and sums up the steps since the last report.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn report(&mut self) -> Result<StepStats> {
+        let buffer = self.workspace.get("counters");
+        let counters = self.gpu.read::<Counters>(buffer, 0, 1)?[0];
+        let sums = std::mem::offset_of!(Counters, sum_steps) / size_of::<u32>();
+        self.gpu.write(buffer, sums, &vec![0u32; size_of::<Counters>() / size_of::<u32>() - sums]);
+        let steps = f64::from(counters.sum_steps.max(1));
+        Ok(StepStats {
+            steps: counters.sum_steps,
+            rays: u64::from(counters.sum_rays),
+            marched: u64::from(counters.sum_samples),
+            samples: u64::from(counters.sum_kept),
+            loss: f64::from(counters.sum_loss) / steps,
+            color_error: f64::from(counters.sum_color_error) / steps,
+        })
+    }
+
+    /// Start of this step's random numbers.
+    fn stream(&self) -> u32 {
+        pcg(self.step.wrapping_add(pcg(self.plan.config.seed)))
+    }
+
+    /// Visits all cells, or every `stride`-th of them in turn.
+    fn refresh_occupancy(&mut self, all: bool) {
+        let grid = &self.plan.config.occupancy;
+        let stride = if all { 1 } else { grid.stride };
+        let first = (self.step / grid.interval) % stride;
+        let cells = (self.plan.cell_count() as u32 - first).div_ceil(stride);
+        let most = self.plan.config.batch.samples as u32;
+        for begin in (0..cells).step_by(most as usize) {
+            let count = most.min(cells - begin);
+            let step = Step {
+                stream: self.stream(),
+                first_cell: first + begin * stride,
+                cell_stride: stride,
+                cell_count: count,
+                ..Step::default()
+            };
+            self.gpu.write(self.workspace.get("step"), 0, &[step]);
+            self.gpu.run("occupancy", self.occupancy.chunk(count as usize), None);
+        }
+        self.gpu.run("occupancy bits", self.occupancy.bits(), None);
+    }
+}
+
+fn step_stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    let mut stages = vec![training::rays(gpu, plan, workspace)?];
+    stages.extend(marching::stages(gpu, plan, workspace, true)?);
+    stages.extend(density::stages(gpu, plan, workspace)?);
+    stages.extend(color::stages(gpu, plan, workspace, color::Selection::Training)?);
+    stages.push(training::composite(gpu, plan, workspace, false)?);
+    stages.extend(training::backward(gpu, plan, workspace)?);
+    stages.extend(training::weight_gradients(gpu, plan, workspace)?);
+    stages.extend(training::update(gpu, plan, workspace)?);
+    Ok(stages)
+}
+
+/// Cameras in box space, and the pixels of all images one behind the other.
+fn upload(gpu: &Gpu, views: &Views<'_>, workspace: &mut Workspace) -> Result<()> {
+    let mut first_texel = 0;
+    let mut cameras = Vec::with_capacity(views.cameras.len());
+    for camera in views.cameras {
+        cameras.push(kernels::Camera::in_box(camera, views.bounds, first_texel as u32));
+        first_texel += camera.width as usize * camera.height as usize;
+    }
+    if u32::try_from(first_texel).is_err() {
+        bail!("the images have {first_texel} pixels together, and at most {} can be addressed", u32::MAX);
+    }
+    workspace.add(gpu.storage_with("cameras", &cameras)?);
+    let hdr = views.images.iter().any(Image::is_hdr);
+    let pixels = if hdr {
+        gpu.storage::<[f32; 4]>("pixels", first_texel)?
+    } else {
+        gpu.storage::<u32>("pixels", first_texel)?
+    };
+    let mut first = 0;
+    for image in views.images {
+        write_pixels(gpu, &pixels, first, &image.pixels);
+        first += image.width as usize * image.height as usize;
+    }
+    workspace.add(pixels);
+    Ok(())
+}
+
+fn write_pixels(gpu: &Gpu, buffer: &Buffer, first: usize, pixels: &Pixels) {
+    match pixels {
+        Pixels::Srgb8(data) => gpu.write(buffer, first, data),
+        Pixels::Linear(data) => gpu.write(buffer, first, data),
+    }
+}
