@@ -1,26 +1,33 @@
-// Adam on the hash table, two entries per thread. A parameter whose gradient is exactly zero was not touched
-// by this batch: it and its moments stay. Needs: step, counters, adam, gradient.
+// Adam on the hash table, two entries per thread. A parameter whose gradient is exactly zero was not touched by
+// this batch: it and its moments stay. Needs: step, counters, adam, gradient.
 
 var<storage, read> counters: Counters;
-var<storage, read_write> table: array<vec4<f32>>;
-var<storage, read_write> table_first: array<vec4<f32>>;
-var<storage, read_write> table_second: array<vec4<f32>>;
+tensor<read_write> table: vec2<f32>;
+// First moments of both features, then the second moments.
+tensor<read_write> table_moments: vec4<f32>;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let index = id.x;
-    if index >= TABLE_ENTRIES / 2u {
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let index = 2u * (id.x + id.y * groups.x * 64u);
+    if index >= TABLE_ENTRIES {
         return;
     }
     let rays = f32(counters.rays_used);
-    let gradient = vec4(gradient_take(2u * index, rays), gradient_take(2u * index + 1u, rays));
-    if all(gradient == vec4(0.0)) {
+    let gradient = vec4(gradient_take(index, rays), gradient_take(index + 1u, rays));
+    let touched = gradient != vec4(0.0);
+    if !any(touched) {
         return;
     }
-    let old = Adam(table[index], table_first[index], table_second[index]);
+    let parameter = vec4(table_load(index), table_load(index + 1u));
+    let low = table_moments_load(index);
+    let high = table_moments_load(index + 1u);
+    let old = Adam(parameter, vec4(low.xy, high.xy), vec4(low.zw, high.zw));
     let updated = adam_update(old, gradient);
-    let touched = gradient != vec4(0.0);
-    table[index] = select(old.parameter, updated.parameter, touched);
-    table_first[index] = select(old.first, updated.first, touched);
-    table_second[index] = select(old.second, updated.second, touched);
+    let next = select(parameter, updated.parameter, touched);
+    let first = select(old.first, updated.first, touched);
+    let second = select(old.second, updated.second, touched);
+    table_store(index, next.xy);
+    table_store(index + 1u, next.zw);
+    table_moments_store(index, vec4(first.xy, second.xy));
+    table_moments_store(index + 1u, vec4(first.zw, second.zw));
 }

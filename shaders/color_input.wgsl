@@ -2,12 +2,11 @@
 // Needs: counters, ray, harmonics.
 
 var<storage, read> counters: Counters;
-var<storage, read> rays: array<Ray>;
-var<storage, read> density_out: array<vec4<f32>>;
-var<storage, read> kept_sample: array<u32>;
-var<storage, read> kept_ray: array<u32>;
+tensor<read> ray_directions: vec4<f32>;
+tensor<read> density_out: vec4<f32>;
+tensor<read> kept_rows: vec2<u32>;
 // `[kept, 8]`: 16 features, 16 harmonics.
-var<storage, read_write> color_input: array<vec4<f32>>;
+tensor<write> color_input: vec4<f32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -15,13 +14,14 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if index >= counters.kept {
         return;
     }
-    let sample = kept_sample[index] * 4u;
-    let terms = harmonics(rays[kept_ray[index]].direction);
+    let kept = kept_rows_load(index);
+    let sample = kept.x * DENSITY_QUADS;
+    let terms = harmonics(ray_directions_load(kept.y).xyz);
     for (var i = 0u; i < 4u; i++) {
-        color_input[index * 8u + i] = density_out[sample + i];
+        color_input_store(index * 8u + i, density_out_load(sample + i));
     }
-    color_input[index * 8u + 4u] = terms[0];
-    color_input[index * 8u + 5u] = terms[1];
-    color_input[index * 8u + 6u] = terms[2];
-    color_input[index * 8u + 7u] = terms[3];
+    color_input_store(index * 8u + 4u, terms[0]);
+    color_input_store(index * 8u + 5u, terms[1]);
+    color_input_store(index * 8u + 6u, terms[2]);
+    color_input_store(index * 8u + 7u, terms[3]);
 }

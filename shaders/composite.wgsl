@@ -4,9 +4,9 @@
 
 var<storage, read> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
-// Log-density and step length.
-var<storage, read> kept_steps: array<vec2<f32>>;
-var<storage, read> color: array<vec4<f32>>;
+// Log-density, step length and gain.
+tensor<read> kept_steps: vec4<f32>;
+tensor<read> color: vec4<f32>;
 var<storage, read> targets: array<vec4<f32>>;
 var<storage, read> backgrounds: array<vec4<f32>>;
 // Colour over the background, and opacity.
@@ -14,7 +14,7 @@ var<storage, read_write> rendered: array<vec4<f32>>;
 // Squared errors of the four channels.
 var<storage, read_write> ray_errors: array<vec4<f32>>;
 // dL/dc in rgb and dL/ds in w. Between the walks it holds tau and T of each sample.
-var<storage, read_write> d_color: array<vec4<f32>>;
+tensor<read_write> d_color: vec4<f32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -29,13 +29,13 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var lost = 0.0;
     var sum = vec4(0.0);
     for (var i = span.x; i < span.x + span.y; i++) {
-        let step = kept_steps[i];
+        let step = kept_steps_load(i);
         let tau = optical_depth(step.x, step.y);
         let transmittance = transmittance_at(depth, tau);
         let weight = transmittance * opacity(tau);
         weight_store(i, weight);
-        sum += weight * vec4(color[i].rgb, 1.0);
-        d_color[i] = vec4(tau, transmittance, 0.0, 0.0);
+        sum += weight * vec4(color_load(i).rgb, 1.0);
+        d_color_store(i, vec4(tau, transmittance, 0.0, 0.0));
         let term = tau - lost;
         let next = depth + term;
         lost = (next - depth) - term;
@@ -50,12 +50,12 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let d_result = error / (2.0 * f32(counters.rays_used));
     var behind = background;
     for (var i = span.x + span.y; i > span.x; i--) {
-        let known = d_color[i - 1u];
+        let known = d_color_load(i - 1u);
         let alpha = opacity(known.x);
         let through = passing(known.x, alpha);
-        let own = vec4(color[i - 1u].rgb, 1.0);
+        let own = vec4(color_load(i - 1u).rgb, 1.0);
         let d_result_d_s = d_log_density(known.x, alpha, through, known.y, own, behind);
-        d_color[i - 1u] = vec4(d_result.rgb * known.y * alpha, dot(d_result, d_result_d_s));
+        d_color_store(i - 1u, vec4(d_result.rgb * known.y * alpha, dot(d_result, d_result_d_s)));
         behind = seen_through(alpha, through, own, behind);
     }
 }

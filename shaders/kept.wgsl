@@ -2,16 +2,15 @@
 // Needs: counters, density.
 
 var<storage, read> counters: Counters;
-var<storage, read> samples: array<vec4<f32>>;
-var<storage, read> density_out: array<f32>;
+tensor<read> samples: vec4<f32>;
+tensor<read> density_out: vec4<f32>;
 var<storage, read> ray_spans: array<vec2<u32>>;
 var<storage, read> kept_spans: array<vec2<u32>>;
-var<storage, read> chosen: array<vec2<u32>>;
-var<storage, read_write> kept_sample: array<u32>;
-var<storage, read_write> kept_ray: array<u32>;
-var<storage, read_write> kept_gain: array<f32>;
-// Log-density and step length.
-var<storage, read_write> kept_steps: array<vec2<f32>>;
+tensor<read> chosen: vec2<u32>;
+// Sample and ray.
+tensor<write> kept_rows: vec2<u32>;
+// Log-density, step length and gain.
+tensor<write> kept_steps: vec4<f32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -22,11 +21,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let first = ray_spans[index].x;
     let span = kept_spans[index];
     for (var i = 0u; i < span.y; i++) {
-        let choice = chosen[first + i];
-        kept_sample[span.x + i] = choice.x;
-        kept_ray[span.x + i] = index;
-        kept_gain[span.x + i] = bitcast<f32>(choice.y);
-        let log_density = density_log(density_out[choice.x * DENSITY_OUTPUTS]);
-        kept_steps[span.x + i] = vec2(log_density, samples[choice.x].w);
+        let choice = chosen_load(first + i);
+        kept_rows_store(span.x + i, vec2(choice.x, index));
+        let log_density = density_log(density_out_load(choice.x * DENSITY_QUADS).x);
+        let delta = samples_load(choice.x).w;
+        kept_steps_store(span.x + i, vec4(log_density, delta, bitcast<f32>(choice.y), 0.0));
     }
 }

@@ -2,8 +2,7 @@
 // Needs: random, step, counters, ray, occupancy, stepping.
 
 var<storage, read> counters: Counters;
-var<storage, read> rays: array<Ray>;
-var<storage, read> occupancy_bits: array<u32>;
+tensor<read> occupancy_bits: u32;
 var<storage, read_write> ray_steps: array<u32>;
 // First sample (written by the scan) and number of samples.
 var<storage, read_write> ray_spans: array<vec2<u32>>;
@@ -11,7 +10,7 @@ var<storage, read_write> ray_spans: array<vec2<u32>>;
 fn occupied(position: vec3<f32>, cascade: u32) -> bool {
     let cell = vec3<u32>(clamp(cascade_position(position, cascade), vec3(0.0), vec3(f32(CELLS) - 1.0)));
     let index = cell_index(cell, cascade);
-    return ((occupancy_bits[index >> 5u] >> (index & 31u)) & 1u) == 1u;
+    return ((occupancy_bits_load(index >> 5u) >> (index & 31u)) & 1u) == 1u;
 }
 
 // Distance from `position` to where the ray leaves its cell.
@@ -29,7 +28,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if index >= counters.rays {
         return;
     }
-    let ray = rays[index];
+    let ray = ray_load(index);
     let first = march_start(ray, index);
     var count = 0u;
     var word = 0u;

@@ -2,7 +2,7 @@
 
 var<storage, read> occupancy: array<f32>;
 var<storage, read> occupancy_mean: array<f32>;
-var<storage, read_write> occupancy_bits: array<u32>;
+tensor<write> occupancy_bits: u32;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -16,5 +16,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let value = occupancy[index * 32u + bit];
         word |= select(0u, 1u << bit, value > threshold);
     }
-    occupancy_bits[index] = word;
+    occupancy_bits_store(index, word);
 }

@@ -2,7 +2,7 @@
 // Needs: random, step, counters, occupancy.
 
 var<storage, read_write> counters: Counters;
-var<storage, read_write> samples: array<vec4<f32>>;
+tensor<write> samples: vec4<f32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -23,5 +23,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         random_f32(step.stream, cell, RANDOM_CELL + 2u),
     );
     let position = ((vec3<f32>(corner) + offset) / f32(CELLS) - 0.5) * cascade_side(cascade) + 0.5;
-    samples[index] = vec4(position, 0.0);
+    samples_store(index, vec4(position, 0.0));
 }

@@ -3,7 +3,6 @@
 
 var<storage, read> counters: Counters;
 var<storage, read> cameras: array<Camera>;
-var<storage, read_write> rays: array<Ray>;
 // Target colour composited over the background, and target opacity.
 var<storage, read_write> targets: array<vec4<f32>>;
 var<storage, read_write> backgrounds: array<vec4<f32>>;
@@ -18,7 +17,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let camera = cameras[view];
     let texel = random_u32(step.stream, index, RANDOM_PIXEL) % (camera.width * camera.height);
     let pixel = vec2(f32(texel % camera.width), f32(texel / camera.width)) + 0.5;
-    rays[index] = camera_ray(camera, pixel);
+    ray_store(index, camera_ray(camera, pixel));
     let color = pixel_target(camera.first_texel + texel);
     let background = background_color(step.stream, index);
     targets[index] = vec4(color.rgb + (1.0 - color.a) * background, color.a);

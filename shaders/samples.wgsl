@@ -2,11 +2,10 @@
 // Needs: random, step, counters, ray, stepping, march_start.
 
 var<storage, read> counters: Counters;
-var<storage, read> rays: array<Ray>;
 var<storage, read> ray_steps: array<u32>;
 var<storage, read> ray_spans: array<vec2<u32>>;
 // Position, and the step's length in units of the inner cube's side.
-var<storage, read_write> samples: array<vec4<f32>>;
+tensor<write> samples: vec4<f32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -18,7 +17,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if span.y == 0u {
         return;
     }
-    let ray = rays[index];
+    let ray = ray_load(index);
     let first = march_start(ray, index);
     var written = 0u;
     var word_index = 0u;
@@ -29,7 +28,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             word &= word - 1u;
             let t = stepping_distance(u);
             let delta = (stepping_distance(u + 1.0) - t) * DENSITY_SCALE;
-            samples[span.x + written] = vec4(ray.origin + t * ray.direction, delta);
+            samples_store(span.x + written, vec4(ray.origin + t * ray.direction, delta));
             written++;
         }
         word_index++;

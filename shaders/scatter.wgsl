@@ -2,9 +2,10 @@
 // per row of workgroups. Needs: counters, grid, gradient.
 
 var<storage, read> counters: Counters;
-var<storage, read> samples: array<vec4<f32>>;
-var<storage, read> kept_sample: array<u32>;
-var<storage, read> d_encoding: array<vec2<f32>>;
+tensor<read> samples: vec4<f32>;
+tensor<read> kept_rows: vec2<u32>;
+// Two levels in each.
+tensor<read> d_encoding: vec4<f32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -13,17 +14,22 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let rays = f32(counters.rays_used);
-    let position = samples[kept_sample[index]].xyz;
+    let position = samples_load(kept_rows_load(index).x).xyz;
     for (var l = 0u; l < LEVELS; l++) {
         let level = levels[l];
-        let gradient = d_encoding[index * LEVELS + l];
+        let both = d_encoding_load(index * (LEVELS / 2u) + l / 2u);
+        let gradient = select(both.xy, both.zw, (l & 1u) == 1u);
         if gradient.x == 0.0 && gradient.y == 0.0 {
             continue;
         }
         let cell = grid_cell(position, level);
-        for (var corner = 0u; corner < 8u; corner++) {
-            let entry = grid_entry(grid_corner(cell, corner), level);
-            gradient_add(entry, grid_weight(cell, corner) * gradient, rays);
-        }
+        gradient_add(cell.entries[0], cell.weights[0] * gradient, rays);
+        gradient_add(cell.entries[1], cell.weights[1] * gradient, rays);
+        gradient_add(cell.entries[2], cell.weights[2] * gradient, rays);
+        gradient_add(cell.entries[3], cell.weights[3] * gradient, rays);
+        gradient_add(cell.entries[4], cell.weights[4] * gradient, rays);
+        gradient_add(cell.entries[5], cell.weights[5] * gradient, rays);
+        gradient_add(cell.entries[6], cell.weights[6] * gradient, rays);
+        gradient_add(cell.entries[7], cell.weights[7] * gradient, rays);
     }
 }

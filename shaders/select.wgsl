@@ -3,12 +3,12 @@
 // Needs: random, step, counters, exp, activation.
 
 var<storage, read> counters: Counters;
-var<storage, read> samples: array<vec4<f32>>;
-var<storage, read> density_out: array<f32>;
+tensor<read> samples: vec4<f32>;
+tensor<read> density_out: vec4<f32>;
 var<storage, read> ray_spans: array<vec2<u32>>;
 var<storage, read_write> kept_spans: array<vec2<u32>>;
 // The chosen samples of ray r from index ray_spans[r].x on: sample, and gain as bits.
-var<storage, read_write> chosen: array<vec2<u32>>;
+tensor<write> chosen: vec2<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -21,7 +21,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var transmittance = 1.0;
     var count = 0u;
     for (var i = span.x; i < span.x + span.y; i++) {
-        let tau = optical_depth(density_log(density_out[i * DENSITY_OUTPUTS]), samples[i].w);
+        let tau = optical_depth(density_log(density_out_load(i * DENSITY_QUADS).x), samples_load(i).w);
         let weight = transmittance * opacity(tau);
         var gain = 1.0;
         if weight < WEIGHT_FLOOR {
@@ -31,7 +31,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             }
         }
         if gain > 0.0 {
-            chosen[span.x + count] = vec2(i, bitcast<u32>(gain));
+            chosen_store(span.x + count, vec2(i, bitcast<u32>(gain)));
             count++;
         }
         depth += tau;

@@ -3,11 +3,11 @@
 
 var<storage, read> counters: Counters;
 var<storage, read> cameras: array<Camera>;
-var<storage, read> samples: array<vec4<f32>>;
+tensor<read> samples: vec4<f32>;
 var<storage, read> kept_spans: array<vec2<u32>>;
-var<storage, read> kept_sample: array<u32>;
-var<storage, read> kept_steps: array<vec2<f32>>;
-var<storage, read> color: array<vec4<f32>>;
+tensor<read> kept_rows: vec2<u32>;
+tensor<read> kept_steps: vec4<f32>;
+tensor<read> color: vec4<f32>;
 // Premultiplied colour without background, and opacity.
 var<storage, read_write> view_color: array<vec4<f32>>;
 // In box units; 0 where the opacity is below 1e-3.
@@ -26,11 +26,11 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var sum = vec4(0.0);
     var distance = 0.0;
     for (var i = span.x; i < span.x + span.y; i++) {
-        let step = kept_steps[i];
+        let step = kept_steps_load(i);
         let tau = optical_depth(step.x, step.y);
         let weight = transmittance_at(depth, tau) * opacity(tau);
-        sum += weight * vec4(color[i].rgb, 1.0);
-        distance += weight * dot(samples[kept_sample[i]].xyz - origin, forward);
+        sum += weight * vec4(color_load(i).rgb, 1.0);
+        distance += weight * dot(samples_load(kept_rows_load(i).x).xyz - origin, forward);
         depth += tau;
     }
     view_color[index] = sum;

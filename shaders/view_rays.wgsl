@@ -3,7 +3,6 @@
 
 var<storage, read> counters: Counters;
 var<storage, read> cameras: array<Camera>;
-var<storage, read_write> rays: array<Ray>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -14,5 +13,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let camera = cameras[0];
     let texel = step.first_pixel + index;
     let pixel = vec2(f32(texel % camera.width), f32(texel / camera.width)) + 0.5;
-    rays[index] = camera_ray(camera, pixel);
+    ray_store(index, camera_ray(camera, pixel));
 }

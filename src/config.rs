@@ -163,9 +163,11 @@ pub enum Transmittance {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Accumulation {
-    /// Fixed point on CPU adapters, float atomics elsewhere, compare-exchange where there are none.
+    /// Ordered on CPU adapters, float atomics elsewhere, compare-exchange where there are none.
     #[default]
     Auto,
+    /// One thread per level adds in the order of the samples: no atomics, and every run gives the same sum.
+    Ordered,
     /// Two fixed-point numbers in a 64-bit integer atomic: independent of order.
     Fixed,
     /// Float atomics.

@@ -7,6 +7,7 @@ pub mod buffer;
 pub mod kernel;
 pub mod pass;
 pub mod source;
+pub mod tensor;
 pub mod timer;
 
 use anyhow::{Context, Result, anyhow};
@@ -28,6 +29,9 @@ pub struct Gpu {
 const WANTED_FEATURES: wgpu::Features = wgpu::Features::SHADER_FLOAT32_ATOMIC
     .union(wgpu::Features::SHADER_INT64)
     .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
+    .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
+    .union(wgpu::Features::CLEAR_TEXTURE)
+    .union(wgpu::Features::SUBGROUP)
     .union(wgpu::Features::TIMESTAMP_QUERY);
 
 impl Gpu {
@@ -66,6 +70,13 @@ impl Gpu {
     #[must_use]
     pub fn has(&self, features: wgpu::Features) -> bool {
         self.device.features().contains(features)
+    }
+
+    /// Whether subgroups hold at least `size` threads, as a multiple of it.
+    #[must_use]
+    pub fn has_subgroups_of(&self, size: u32) -> bool {
+        let least = self.info.subgroup_min_size;
+        self.has(wgpu::Features::SUBGROUP) && least >= size && least.is_multiple_of(size)
     }
 
     /// Submits the recorded commands.

@@ -23,9 +23,11 @@ use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::kernel::{Bound, Kernel, Resource, Shared};
 use crate::gpu::source::Source;
+use crate::gpu::tensor::{Element, Memory, Tensor};
 use crate::gpu_struct;
 use crate::model::{DENSITY_OUTPUTS, Layout, Level};
 use anyhow::Result;
+use serde::{Deserialize, Serialize};
 use std::fmt::Display;
 
 /// A file of WGSL under its name.
@@ -36,6 +38,8 @@ const STEP: Part = part!("common/step.wgsl");
 const COUNTERS: Part = part!("common/counters.wgsl");
 const RAY: Part = part!("common/ray.wgsl");
 const CAMERA: Part = part!("common/camera.wgsl");
+const RAY_LOAD: Part = part!("common/ray_load.wgsl");
+const RAY_STORE: Part = part!("common/ray_store.wgsl");
 const OCCUPANCY: Part = part!("common/occupancy.wgsl");
 const MARCH_START: Part = part!("common/march_start.wgsl");
 const EXP: Part = part!("common/exp.wgsl");
@@ -50,8 +54,8 @@ const COUNT_KEPT: Part = part!("layer/count_kept.wgsl");
 pub mod dispatch {
     /// Over rays.
     pub const RAYS: usize = 0;
-    /// Over marched samples.
-    pub const SAMPLES: usize = 1;
+    /// Over marched samples and pairs of levels.
+    pub const ENCODE: usize = 1;
     /// Over marched samples, several per thread.
     pub const SAMPLE_TILES: usize = 2;
     /// Over kept samples.
@@ -147,7 +151,7 @@ gpu_struct! {
 }
 
 /// What a scene needs, apart from the configuration.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Needs {
     /// Some camera has lens distortion.
     pub lens: bool,
@@ -172,10 +176,12 @@ pub struct Plan {
     pub layout: Layout,
     /// What the scene needs.
     pub needs: Needs,
-    /// Samples that one thread of a matrix product handles.
-    pub samples_per_thread: usize,
+    /// How matrix products are written.
+    pub product: layer::Product,
     /// How the table's gradients are summed.
     pub accumulation: Accumulation,
+    /// Where tensors live.
+    pub memory: Memory,
 }
 
 /// Chunks of samples whose weight gradients are summed apart.
@@ -185,15 +191,16 @@ impl Plan {
     /// Chooses what depends on the adapter.
     #[must_use]
     pub fn new(gpu: &Gpu, config: Config, layout: Layout, needs: Needs) -> Self {
-        let int64 = wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS;
         let accumulation = match config.accumulation {
-            Accumulation::Auto if gpu.is_cpu() && gpu.has(int64) && !needs.hdr => Accumulation::Fixed,
+            Accumulation::Auto if gpu.is_cpu() => Accumulation::Ordered,
             Accumulation::Auto if gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC) => Accumulation::Float,
             Accumulation::Auto => Accumulation::Exchange,
             chosen => chosen,
         };
-        let samples_per_thread = if gpu.is_cpu() { 4 } else { 2 };
-        Self { config, layout, needs, samples_per_thread, accumulation }
+        let shared_weights = gpu.is_cpu() && gpu.has_subgroups_of(8);
+        let rows = std::env::var("SPT").ok().and_then(|s| s.parse().ok()).unwrap_or(8);
+        let product = layer::Product { rows, shared_weights };
+        Self { config, layout, needs, product, accumulation, memory: gpu.fast_memory() }
     }
 
     /// The smallest step in box units.
@@ -262,7 +269,7 @@ impl Plan {
     /// The text of a kernel, before it is linked.
     #[must_use]
     pub fn source(&self, label: &str, parts: &[Part]) -> Source {
-        let source = self.numbers(self.dimensions(Source::new(label)));
+        let source = self.numbers(self.dimensions(Source::new(label).memory(self.memory)));
         parts.iter().fold(source, |source, (name, text)| source.part(name, *text))
     }
 
@@ -272,9 +279,10 @@ impl Plan {
             ("LEVELS", layout.levels.len()),
             ("TABLE_ENTRIES", layout.entries),
             ("DENSITY_OUTPUTS", DENSITY_OUTPUTS),
+            ("DENSITY_QUADS", DENSITY_OUTPUTS / 4),
             ("MLP_QUADS", layout.quads),
             ("CHUNKS", CHUNKS),
-            ("SAMPLES_PER_THREAD", self.samples_per_thread),
+            ("SAMPLES_PER_THREAD", self.product.rows),
             ("CELLS", config.occupancy.cells as usize),
             ("CELL_COUNT", self.cell_count()),
             ("CASCADES", needs.cascades as usize),
@@ -286,7 +294,7 @@ impl Plan {
             ("LEAST_RAYS", 16),
             ("MOST_RAYS", config.batch.rays),
             ("DISPATCH_RAYS", dispatch::RAYS),
-            ("DISPATCH_SAMPLES", dispatch::SAMPLES),
+            ("DISPATCH_ENCODE", dispatch::ENCODE),
             ("DISPATCH_SAMPLE_TILES", dispatch::SAMPLE_TILES),
             ("DISPATCH_KEPT", dispatch::KEPT),
             ("DISPATCH_KEPT_TILES", dispatch::KEPT_TILES),
@@ -317,6 +325,7 @@ impl Plan {
             ("BETA_2", config.optimizer.beta_2),
             ("EPSILON", config.optimizer.epsilon),
             ("L2", config.optimizer.l2),
+            ("GRADIENT_SCALE", 4_194_304.0),
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         source
@@ -355,12 +364,30 @@ impl Plan {
         }
     }
 
-    fn gradient(&self) -> Part {
+    /// The parts that add a gradient and take the sum.
+    fn gradient(&self) -> [Part; 2] {
+        let float = part!("gradient/take_float.wgsl");
         match self.accumulation {
-            Accumulation::Fixed => part!("gradient/fixed.wgsl"),
-            Accumulation::Float => part!("gradient/float.wgsl"),
-            Accumulation::Auto | Accumulation::Exchange => part!("gradient/exchange.wgsl"),
+            Accumulation::Fixed => [part!("gradient/fixed.wgsl"), part!("gradient/take_fixed.wgsl")],
+            Accumulation::Float => [part!("gradient/float.wgsl"), float],
+            Accumulation::Exchange => [part!("gradient/exchange.wgsl"), float],
+            Accumulation::Auto | Accumulation::Ordered => {
+                [part!("scatter_ordered.wgsl"), part!("gradient/take_ordered.wgsl")]
+            }
         }
+    }
+
+    /// Adds a tensor to `workspace`.
+    fn allocate(
+        &self,
+        gpu: &Gpu,
+        workspace: &mut Workspace,
+        list: &[(&'static str, Element, usize)],
+    ) -> Result<()> {
+        for &(name, element, count) in list {
+            workspace.add_tensor(gpu.tensor(name, element, count, self.memory)?);
+        }
+        Ok(())
     }
 }
 
@@ -369,21 +396,32 @@ fn vec3(value: [f32; 3]) -> impl Display {
     format!("vec3<f32>({x:?}, {y:?}, {z:?})")
 }
 
-/// Buffers by name: what kernels are bound to.
+/// Buffers and tensors by name: what kernels are bound to.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
     buffers: Vec<Buffer>,
+    tensors: Vec<Tensor>,
 }
 
 impl Workspace {
     /// Adds a buffer; its name must be new.
     pub fn add(&mut self, buffer: Buffer) {
-        debug_assert!(self.find(buffer.name).is_none(), "two buffers named {}", buffer.name);
+        debug_assert!(
+            self.buffers.iter().all(|b| b.name != buffer.name),
+            "two buffers named {}",
+            buffer.name
+        );
         self.buffers.push(buffer);
     }
 
-    fn find(&self, name: &str) -> Option<&Buffer> {
-        self.buffers.iter().find(|buffer| buffer.name == name)
+    /// Adds a tensor; its name must be new.
+    pub fn add_tensor(&mut self, tensor: Tensor) {
+        debug_assert!(
+            self.tensors.iter().all(|t| t.name != tensor.name),
+            "two tensors named {}",
+            tensor.name
+        );
+        self.tensors.push(tensor);
     }
 
     /// The buffer `name`.
@@ -392,10 +430,46 @@ impl Workspace {
     /// When there is none: names are fixed in this module and its children.
     #[must_use]
     pub fn get(&self, name: &str) -> &Buffer {
-        self.find(name).unwrap_or_else(|| unreachable!("no buffer named '{name}'"))
+        let found = self.buffers.iter().find(|buffer| buffer.name == name);
+        found.unwrap_or_else(|| unreachable!("no buffer named '{name}'"))
     }
 
-    /// Binds `kernel` to the buffers of the names it uses; `renamed` pairs a WGSL name with a buffer's.
+    /// The tensor `name`.
+    ///
+    /// # Panics
+    /// When there is none: names are fixed in this module and its children.
+    #[must_use]
+    pub fn tensor(&self, name: &str) -> &Tensor {
+        let found = self.tensors.iter().find(|tensor| tensor.name == name);
+        found.unwrap_or_else(|| unreachable!("no tensor named '{name}'"))
+    }
+
+    /// Reads the first `count` values of a buffer or tensor, waiting for the device.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn read<T: bytemuck::Pod>(&self, gpu: &Gpu, name: &str, count: usize) -> Result<Vec<T>> {
+        match self.tensors.iter().find(|tensor| tensor.name == name) {
+            Some(tensor) => gpu.read_tensor(tensor, count),
+            None => gpu.read(self.get(name), 0, count),
+        }
+    }
+
+    /// Writes `data` at the start of a buffer or tensor, before the next submission.
+    pub fn write<T: bytemuck::Pod>(&self, gpu: &Gpu, name: &str, data: &[T]) {
+        match self.tensors.iter().find(|tensor| tensor.name == name) {
+            Some(tensor) => gpu.write_tensor(tensor, data),
+            None => gpu.write(self.get(name), 0, data),
+        }
+    }
+
+    /// Shares a buffer or a tensor of `other`.
+    pub fn share(&mut self, other: &Self, name: &str) {
+        self.buffers.extend(other.buffers.iter().find(|buffer| buffer.name == name).cloned());
+        self.tensors.extend(other.tensors.iter().find(|tensor| tensor.name == name).cloned());
+    }
+
+    /// Binds `kernel` to what it uses; `renamed` pairs a WGSL name with the name here.
     ///
     /// # Errors
     /// When one is missing.
@@ -415,15 +489,20 @@ impl Workspace {
         further: &[Resource<'_>],
     ) -> Result<Bound> {
         let mut resources = further.to_vec();
-        resources.extend(renamed.iter().map(|(name, buffer)| self.get(buffer).named(name)));
+        for (name, here) in renamed {
+            resources.extend(self.buffers.iter().find(|b| b.name == *here).map(|b| b.named(name)));
+            resources.extend(self.tensors.iter().find(|t| t.name == *here).map(|t| t.named(name)));
+        }
         resources.extend(self.buffers.iter().map(Buffer::resource));
+        resources.extend(self.tensors.iter().map(|tensor| tensor.named(tensor.name)));
         kernel.bind(gpu, &resources)
     }
 
-    /// Bytes of all buffers.
+    /// Bytes of everything in it.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.buffers.iter().map(|buffer| buffer.raw.size()).sum()
+        let buffers: u64 = self.buffers.iter().map(|buffer| buffer.raw.size()).sum();
+        buffers + self.tensors.iter().map(Tensor::bytes).sum::<u64>()
     }
 }
 

@@ -1,6 +1,65 @@
-//! x
-#![allow(missing_docs)]
+//! Trains neural radiance fields from posed photos and renders new views of them, on any GPU that `wgpu`
+//! reaches and on plain CPUs through a software driver.
+//!
+//! # The way through
+//!
+//! ```text
+//! transforms.json + images ──> dataset ──> train ──> checkpoint ──> render ──> EXR, PNG, scores
+//! ```
+//!
+//! [`dataset`] reads cameras and images. [`train::Trainer`] owns the field on the device and takes steps: rays,
+//! march, density, selection, colour, the fused render·loss·gradient kernel, backward, Adam. [`checkpoint`]
+//! keeps a field on disk. [`render::Renderer`] shows it to any camera. The command line on top of it is the
+//! binary of this package.
+//!
+//! Underneath, [`model`] lays out the parameters, [`kernels`] lists what runs on the device, and [`gpu`] knows
+//! how: choosing an adapter, linking WGSL, binding by name. [`mod@reference`] is the same mathematics in plain
+//! `f64`, which the kernels are tested against, and [`scene`] renders scenes whose truth is known.
+//!
+//! # Conventions
+//!
+//! - World space is the dataset's own, in its own units. The cube that the grid covers is internal.
+//! - Camera axes are OpenGL's: +X right, +Y up, the camera looks along -Z. Pixel centres lie at `+0.5`.
+//! - A field of 8-bit images holds display-referred (sRGB) colours, and is composited as such; a field of
+//!   OpenEXR images holds linear light. Rendered colours are premultiplied by their opacity.
+//! - Depth is the mean distance along the view axis, in world units.
+//! - Gradients are called `d_<name>` for the derivative of the loss by `<name>`.
+//!
+//! # A training in code
+//!
+//! ```no_run
+//! use nerf::{config::Config, dataset::Dataset, gpu, kernels::{Needs, Plan}, model, train};
+//! use std::{path::Path, sync::Arc};
+//!
+//! # fn main() -> anyhow::Result<()> {
+//! let dataset = Dataset::open(Path::new("data/lego"), &Default::default())?;
+//! let images = dataset.load_images(&dataset.train, &|_| {})?;
+//! let cameras: Vec<_> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
+//! let gpu = Arc::new(gpu::Gpu::open(&gpu::adapter::choose(None)?)?);
+//! let config = Config::default();
+//! let finest = model::finest_resolution(config.grid.base, &dataset.bounds, &cameras);
+//! let layout = model::Layout::new(&config, finest);
+//! let needs = Needs {
+//!     lens: false,
+//!     hdr: dataset.is_hdr,
+//!     cascades: dataset.bounds.cascades,
+//!     box_min: [0.0; 3],
+//!     box_max: [1.0; 3],
+//!     cameras: cameras.len(),
+//! };
+//! let plan = Plan::new(&gpu, config, layout, needs);
+//! let views = train::Views { cameras: &cameras, images: &images, bounds: &dataset.bounds };
+//! let mut trainer = train::Trainer::new(&gpu, plan, &views)?;
+//! for _ in 0..1000 {
+//!     trainer.step(1e-2, None)?;
+//! }
+//! println!("loss {}", trainer.report()?.loss);
+//! # Ok(())
+//! # }
+//! ```
+
 pub mod camera;
+pub mod checkpoint;
 pub mod config;
 pub mod dataset;
 pub mod file;
@@ -9,7 +68,11 @@ pub mod image;
 pub mod kernels;
 pub mod metrics;
 pub mod model;
+pub mod orbit;
+pub mod picture;
 pub mod reference;
 pub mod render;
 pub mod scene;
+pub mod schedule;
 pub mod train;
+pub mod visibility;

@@ -1,2 +1,31 @@
-//! x
-fn main() {}
+//! `nerf`: trains radiance fields and renders them, from the command line.
+
+mod cli;
+mod commands;
+mod progress;
+mod remarks;
+
+use clap::Parser;
+use std::io::{ErrorKind, Write};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = cli::Cli::parse();
+    let Err(error) = commands::run(&cli) else { return ExitCode::SUCCESS };
+    if is_broken_pipe(&error) {
+        return ExitCode::SUCCESS;
+    }
+    let message = format!("{error:#}");
+    // Where even this cannot be written, the exit code still tells.
+    if cli.global.json {
+        let _ = writeln!(std::io::stdout(), "{}", serde_json::json!({ "error": message }));
+    }
+    let _ = writeln!(std::io::stderr(), "error: {message}");
+    ExitCode::FAILURE
+}
+
+/// Whether whoever read our output has gone, which is no failure.
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let cause = error.chain().find_map(|cause| cause.downcast_ref::<std::io::Error>());
+    cause.is_some_and(|cause| cause.kind() == ErrorKind::BrokenPipe)
+}

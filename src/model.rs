@@ -1,6 +1,8 @@
 //! The parameters of a field and their layout: levels of the grid, layers of the networks.
 
+use crate::camera::Camera;
 use crate::config::Config;
+use crate::dataset::Bounds;
 use crate::gpu_struct;
 
 /// Features per entry of the hash table.
@@ -147,6 +149,28 @@ fn grid_levels(config: &Config, finest: u32) -> Vec<Level> {
         .collect()
 }
 
+/// Finest cells along a pixel of a training view.
+const CELLS_PER_PIXEL: f64 = 1.5;
+/// Most cells per axis of a scene with cascades, whose far cubes no view sees that sharply.
+const MOST_CELLS_WITH_CASCADES: f64 = 4096.0;
+/// Most cells per axis of any scene.
+const MOST_CELLS: f64 = 65536.0;
+
+/// Cells per axis of the finest level when the configuration leaves them open: one and a half along what a
+/// pixel of the median training view covers at the box's centre.
+#[must_use]
+pub fn finest_resolution(base: u32, bounds: &Bounds, cameras: &[Camera]) -> u32 {
+    let sharpness = |camera: &Camera| {
+        camera.focal_px.max_element() / camera.position().distance(bounds.center).max(0.1 * bounds.half)
+    };
+    let mut pixels_per_length: Vec<f64> = cameras.iter().map(sharpness).collect();
+    pixels_per_length.sort_by(f64::total_cmp);
+    let middle = pixels_per_length.get(cameras.len() / 2).copied().unwrap_or(0.0);
+    let most = if bounds.cascades > 1 { MOST_CELLS_WITH_CASCADES } else { MOST_CELLS };
+    let cells = CELLS_PER_PIXEL * 2.0 * bounds.outer_half() * middle;
+    (cells.min(most) as u32).max(base)
+}
+
 /// The project's integer hash (PCG, Jarzynski & Olano 2020), the same as in the kernels.
 #[must_use]
 pub fn pcg(value: u32) -> u32 {
@@ -170,5 +194,33 @@ impl Random {
     fn uniform(&mut self) -> f32 {
         self.index += 1;
         (pcg(self.index.wrapping_add(self.stream)) >> 8) as f32 / (1 << 24) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Lens;
+    use glam::{DAffine3, DVec2, DVec3};
+
+    #[test]
+    fn the_finest_cells_follow_the_pixels() {
+        let camera = |distance: f64| Camera {
+            width: 100,
+            height: 100,
+            focal_px: DVec2::splat(200.0),
+            center_px: DVec2::splat(50.0),
+            lens: Lens::Pinhole,
+            world_from_camera: DAffine3::from_translation(DVec3::new(distance, 0.0, 0.0)),
+        };
+        let cameras = [camera(2.0), camera(4.0), camera(40.0)];
+        let bounds = |cascades| Bounds { center: DVec3::ZERO, half: 1.0, cascades, source: String::new() };
+        // 200 px / 4 = 50 pixels per unit, 100 across the box of side 2, 150 cells.
+        assert_eq!(finest_resolution(16, &bounds(1), &cameras), 150);
+        assert_eq!(finest_resolution(16, &bounds(3), &cameras), 600);
+        assert_eq!(finest_resolution(16, &bounds(8), &cameras), 4096);
+        assert_eq!(finest_resolution(256, &bounds(1), &cameras), 256);
+        assert_eq!(finest_resolution(16, &bounds(1), &[]), 16);
+        assert_eq!(finest_resolution(16, &bounds(1), &[camera(0.0)]), 6000);
     }
 }

@@ -53,7 +53,7 @@ impl Renderer {
         plan.config.batch.rays = RAYS;
         let mut workspace = Workspace::default();
         for name in PARAMETERS {
-            workspace.add(field.get(name).clone());
+            workspace.share(field, name);
         }
         marching::allocate(gpu, &plan, &mut workspace)?;
         density::allocate(gpu, &plan, &mut workspace)?;

@@ -11,7 +11,8 @@ use crate::gpu::pass::Stage;
 use crate::gpu::timer::Timer;
 use crate::image::{Image, Pixels};
 use crate::kernels::{self, Counters, Plan, Step, Workspace, color, density, marching, occupancy, training};
-use crate::model::pcg;
+use crate::model::{FEATURES, pcg};
+use crate::visibility;
 use anyhow::{Result, bail};
 use std::sync::Arc;
 
@@ -24,7 +25,7 @@ pub struct Trainer {
     stages: Vec<Stage>,
     occupancy: occupancy::Update,
     step: u32,
-    /// What every cell of the occupancy grid starts from: 0, or -1 where no camera sees it.
+    /// What every cell of the occupancy grid starts from: 0, or -1 where nothing can be.
     first_occupancy: Vec<f32>,
 }
 
@@ -85,22 +86,15 @@ impl Trainer {
         upload(gpu, views, &mut workspace)?;
         let stages = step_stages(gpu, &plan, &workspace)?;
         let occupancy = occupancy::Update::new(gpu, &plan, &workspace)?;
-        let first_occupancy = vec![0.0; plan.cell_count()];
+        let cells = plan.config.occupancy.cells;
+        let first_occupancy = visibility::hidden_cells(views.cameras, views.images, views.bounds, cells)
+            .into_iter()
+            .map(|hidden| if hidden { -1.0 } else { 0.0 })
+            .collect();
         let mut trainer =
             Self { gpu: Arc::clone(gpu), plan, workspace, stages, occupancy, step: 0, first_occupancy };
         trainer.reset()?;
         Ok(trainer)
-    }
-
-    /// Takes the cells that no camera sees out of the field for good.
-    ///
-    /// # Errors
-    /// When the device was lost.
-    pub fn exclude_cells(&mut self, unseen: &[bool]) -> Result<()> {
-        for (value, &unseen) in self.first_occupancy.iter_mut().zip(unseen) {
-            *value = if unseen { -1.0 } else { 0.0 };
-        }
-        self.reset()
     }
 
     /// Runs every kernel once, so that drivers that compile at the first dispatch have done so, and starts over.
@@ -121,14 +115,13 @@ impl Trainer {
     pub fn reset(&mut self) -> Result<()> {
         let seed = self.plan.config.seed;
         let layout = &self.plan.layout;
-        let zeros = |name| vec![0.0; self.workspace.get(name).raw.size() as usize / size_of::<f32>()];
         let buffers = training::STATE
             .iter()
             .map(|&name| match name {
                 "table" => layout.initial_table(seed),
                 "mlp" => layout.initial_weights(seed),
                 "occupancy" => self.first_occupancy.clone(),
-                moments => zeros(moments),
+                moments => vec![0.0; self.state_length(moments)],
             })
             .collect();
         let rays = self.plan.config.batch.first_rays;
@@ -143,20 +136,22 @@ impl Trainer {
     /// When the state is of another layout, or the device was lost.
     pub fn restore(&mut self, state: &State) -> Result<()> {
         for (&name, data) in training::STATE.iter().zip(&state.buffers) {
-            let buffer = self.workspace.get(name);
-            let (expected, found) = (buffer.raw.size() as usize, size_of_val(data.as_slice()));
-            if found > expected || expected - found >= 16 {
-                bail!("the state's '{name}' has {found} bytes, and this configuration needs {expected}");
+            let expected = self.state_length(name);
+            if data.len() != expected {
+                bail!(
+                    "the state's '{name}' has {} numbers, and this configuration needs {expected}",
+                    data.len()
+                );
             }
-            self.gpu.write(buffer, 0, data);
+            self.workspace.write(&self.gpu, name, data);
         }
-        self.gpu.write(self.workspace.get("occupancy_bits"), 0, &state.occupancy_bits);
+        self.workspace.write(&self.gpu, "occupancy_bits", &state.occupancy_bits);
         let counters = Counters { rays: state.rays, rays_used: 1, ..Counters::default() };
         self.gpu.write(self.workspace.get("counters"), 0, &[counters]);
         let groups = [[state.rays.div_ceil(64), 1, 1, 0]];
         self.gpu.write(self.workspace.get("dispatch"), kernels::dispatch::RAYS, &groups);
         let mut encoder = self.gpu.encoder("restore");
-        encoder.clear_buffer(&self.workspace.get("d_table").raw, 0, None);
+        self.workspace.tensor("d_table").clear(&mut encoder);
         self.gpu.submit(encoder);
         self.step = state.step;
         self.gpu.wait()
@@ -167,18 +162,25 @@ impl Trainer {
     /// # Errors
     /// When the device was lost.
     pub fn state(&self) -> Result<State> {
-        let read = |name: &&str| {
-            let buffer = self.workspace.get(name);
-            self.gpu.read::<f32>(buffer, 0, buffer.raw.size() as usize / size_of::<f32>())
-        };
+        let read = |name: &&str| self.workspace.read::<f32>(&self.gpu, name, self.state_length(name));
         let buffers = training::STATE.iter().map(read).collect::<Result<_>>()?;
-        let bits = self.workspace.get("occupancy_bits");
         Ok(State {
             step: self.step,
             rays: self.gpu.read::<Counters>(self.workspace.get("counters"), 0, 1)?[0].rays,
             buffers,
-            occupancy_bits: self.gpu.read(bits, 0, self.plan.cell_count() / 32)?,
+            occupancy_bits: self.workspace.read(&self.gpu, "occupancy_bits", self.plan.cell_count() / 32)?,
         })
+    }
+
+    /// Number of floats of a part of the state.
+    fn state_length(&self, name: &str) -> usize {
+        let layout = &self.plan.layout;
+        match name {
+            "table" => layout.entries * FEATURES,
+            "table_moments" => layout.entries * FEATURES * 2,
+            "occupancy" => self.plan.cell_count(),
+            _ => layout.quads * 4,
+        }
     }
 
     /// One step: refresh the occupancy grid when it is due, then rays → march → density → select → colour →

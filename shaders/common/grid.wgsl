@@ -13,33 +13,36 @@ struct Level {
 
 var<uniform> levels: array<Level, LEVELS>;
 
+// The eight corners of a cell; corner c lies at the cell's far side along x, y, z where bit 0, 1, 2 of c is set.
 struct GridCell {
-    corner: vec3<u32>,
-    weight: vec3<f32>,
+    entries: array<u32, 8>,
+    // Trilinear weights.
+    weights: array<f32, 8>,
 }
 
+// What is common to several corners is computed once; everything has constant indices, so that software
+// drivers keep it in registers.
 fn grid_cell(position: vec3<f32>, level: Level) -> GridCell {
     let scaled = clamp(position, vec3(0.0), vec3(1.0)) * f32(level.resolution);
     let corner = min(vec3<u32>(scaled), vec3(level.resolution - 1u));
-    return GridCell(corner, scaled - vec3<f32>(corner));
-}
-
-fn grid_entry(vertex: vec3<u32>, level: Level) -> u32 {
-    if level.dense == 1u {
-        let side = level.resolution + 1u;
-        return level.first + vertex.x + side * (vertex.y + side * vertex.z);
-    }
-    let hash = vertex.x ^ (vertex.y * 2654435761u) ^ (vertex.z * 805459861u);
-    return level.first + (hash & (level.entries - 1u));
-}
-
-// Trilinear weight of corner 0..7 (bit 0: x, bit 1: y, bit 2: z).
-fn grid_weight(cell: GridCell, corner: u32) -> f32 {
-    let high = vec3<f32>(vec3(corner, corner >> 1u, corner >> 2u) & vec3(1u));
-    let factor = mix(1.0 - cell.weight, cell.weight, high);
-    return factor.x * factor.y * factor.z;
-}
-
-fn grid_corner(cell: GridCell, corner: u32) -> vec3<u32> {
-    return cell.corner + (vec3(corner, corner >> 1u, corner >> 2u) & vec3(1u));
+    let far = scaled - vec3<f32>(corner);
+    let near = 1.0 - far;
+    let side = level.resolution + 1u;
+    let dense = level.dense == 1u;
+    let stride = select(vec2(2654435761u, 805459861u), vec2(side, side * side), dense);
+    let x = vec2(corner.x, corner.x + 1u);
+    let y = vec2(corner.y * stride.x, corner.y * stride.x + stride.x);
+    let z = vec2(corner.z * stride.y, corner.z * stride.y + stride.y);
+    let mask = level.entries - 1u;
+    let yz = vec4(near.y * near.z, far.y * near.z, near.y * far.z, far.y * far.z);
+    let hash_yz = vec4(y.x ^ z.x, y.y ^ z.x, y.x ^ z.y, y.y ^ z.y);
+    let dense_yz = vec4(y.x + z.x, y.y + z.x, y.x + z.y, y.y + z.y);
+    let even = level.first + select((vec4(x.x) ^ hash_yz) & vec4(mask), x.x + dense_yz, dense);
+    let odd = level.first + select((vec4(x.y) ^ hash_yz) & vec4(mask), x.y + dense_yz, dense);
+    let low = near.x * yz;
+    let high = far.x * yz;
+    return GridCell(
+        array(even.x, odd.x, even.y, odd.y, even.z, odd.z, even.w, odd.w),
+        array(low.x, high.x, low.y, high.y, low.z, high.z, low.w, high.w),
+    );
 }

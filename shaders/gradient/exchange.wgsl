@@ -21,13 +21,3 @@ fn gradient_add(entry: u32, gradient: vec2<f32>, rays: f32) {
     gradient_add_scalar(2u * entry, gradient.x);
     gradient_add_scalar(2u * entry + 1u, gradient.y);
 }
-
-// Reads and clears.
-fn gradient_take(entry: u32, rays: f32) -> vec2<f32> {
-    let bits = vec2(atomicLoad(&d_table[2u * entry]), atomicLoad(&d_table[2u * entry + 1u]));
-    if bits.x != 0u || bits.y != 0u {
-        atomicStore(&d_table[2u * entry], 0u);
-        atomicStore(&d_table[2u * entry + 1u], 0u);
-    }
-    return bitcast<vec2<f32>>(bits);
-}

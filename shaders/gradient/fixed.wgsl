@@ -4,7 +4,6 @@
 
 var<storage, read_write> d_table: array<atomic<u64>>;
 
-const GRADIENT_SCALE = 4194304.0;
 const GRADIENT_MOST = 1e9;
 
 fn gradient_add(entry: u32, gradient: vec2<f32>, rays: f32) {
@@ -16,16 +15,4 @@ fn gradient_add(entry: u32, gradient: vec2<f32>, rays: f32) {
     // The low half is sign-extended: what it borrows from the high half comes back when it is taken out.
     let packed = i64(fixed.x) + (i64(fixed.y) << 32u);
     atomicAdd(&d_table[entry], bitcast<u64>(packed));
-}
-
-// Reads and clears.
-fn gradient_take(entry: u32, rays: f32) -> vec2<f32> {
-    let packed = bitcast<i64>(atomicLoad(&d_table[entry]));
-    if packed == 0li {
-        return vec2(0.0);
-    }
-    atomicStore(&d_table[entry], 0lu);
-    let low = i32(packed & 0xffffffffli);
-    let high = i32((packed - i64(low)) >> 32u);
-    return vec2(f32(low), f32(high)) / (2.0 * rays * GRADIENT_SCALE);
 }

@@ -10,13 +10,3 @@ fn gradient_add(entry: u32, gradient: vec2<f32>, rays: f32) {
         atomicAdd(&d_table[2u * entry + 1u], gradient.y);
     }
 }
-
-// Reads and clears.
-fn gradient_take(entry: u32, rays: f32) -> vec2<f32> {
-    let gradient = vec2(atomicLoad(&d_table[2u * entry]), atomicLoad(&d_table[2u * entry + 1u]));
-    if gradient.x != 0.0 || gradient.y != 0.0 {
-        atomicStore(&d_table[2u * entry], 0.0);
-        atomicStore(&d_table[2u * entry + 1u], 0.0);
-    }
-    return gradient;
-}

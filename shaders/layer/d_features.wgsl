@@ -1,17 +1,17 @@
 // Provides: layer_d_store, the gradient of the density network's outputs; the first one also carries the
 // gradient of the log-density that the fused kernel found. Needs: density.
 
-var<storage, read> d_color: array<vec4<f32>>;
-var<storage, read> density_out: array<f32>;
-var<storage, read> kept_sample: array<u32>;
-var<storage, read> kept_gain: array<f32>;
-var<storage, read_write> d_input: array<vec4<f32>>;
+tensor<read> d_color: vec4<f32>;
+tensor<read> density_out: vec4<f32>;
+tensor<read> kept_rows: vec2<u32>;
+tensor<read> kept_steps: vec4<f32>;
+tensor<write> d_input: vec4<f32>;
 
 fn layer_d_store(row: u32, quad: u32, sum: vec4<f32>) {
     var gradient = sum;
     if quad == 0u {
-        let raw = density_out[kept_sample[row] * DENSITY_OUTPUTS];
-        gradient.x += density_log_backward(raw, d_color[row].w * kept_gain[row]);
+        let raw = density_out_load(kept_rows_load(row).x * DENSITY_QUADS).x;
+        gradient.x += density_log_backward(raw, d_color_load(row).w * kept_steps_load(row).z);
     }
-    d_input[row * (DENSITY_OUTPUTS / 4u) + quad] = gradient;
+    d_input_store(row * (DENSITY_QUADS) + quad, gradient);
 }

@@ -1,12 +1,12 @@
 // Provides: layer_gradient, the gradient of the colour network's raw outputs, which it also stores for the
 // weights' gradient. Needs: activation.
 
-var<storage, read> color: array<vec4<f32>>;
-var<storage, read> d_color: array<vec4<f32>>;
-var<storage, read_write> d_raw_color: array<vec4<f32>>;
+tensor<read> color: vec4<f32>;
+tensor<read> d_color: vec4<f32>;
+tensor<write> d_raw_color: vec4<f32>;
 
 fn layer_gradient(row: u32, quad: u32) -> vec4<f32> {
-    let gradient = vec4(color_activation_backward(color[row].rgb, d_color[row].rgb), 0.0);
-    d_raw_color[row] = gradient;
+    let gradient = vec4(color_activation_backward(color_load(row).rgb, d_color_load(row).rgb), 0.0);
+    d_raw_color_store(row, gradient);
     return gradient;
 }

@@ -1,7 +1,7 @@
 // Provides: layer_store, the colour of a row. Needs: activation.
 
-var<storage, read_write> color: array<vec4<f32>>;
+tensor<write> color: vec4<f32>;
 
 fn layer_store(row: u32, quad: u32, sum: vec4<f32>) {
-    color[row] = vec4(color_activation(sum.rgb), 0.0);
+    color_store(row, vec4(color_activation(sum.rgb), 0.0));
 }

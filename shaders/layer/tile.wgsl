@@ -16,15 +16,15 @@ struct Tile {
 }
 
 var<uniform> tile: Tile;
-var<storage, read> layer_input: array<vec4<f32>>;
-var<storage, read> d_output: array<vec4<f32>>;
-var<storage, read> kept_sample: array<u32>;
+tensor<read> layer_input: vec4<f32>;
+tensor<read> d_output: vec4<f32>;
+tensor<read> kept_rows: vec2<u32>;
 // `[chunks, quads of all layers]`.
-var<storage, read_write> d_weight_chunks: array<vec4<f32>>;
+tensor<write> d_weight_chunks: vec4<f32>;
 
 fn tile_row(row: u32) -> u32 {
     if tile.of_samples == 1u {
-        return kept_sample[row];
+        return kept_rows_load(row).x;
     }
     return row;
 }

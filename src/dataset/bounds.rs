@@ -1,6 +1,7 @@
 //! The part of the world that is modelled: a cube, found from the cameras or taken from the file.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::focus::{Axis, Focus, FocusKind, find, median};
 use super::notes::Notes;
@@ -9,7 +10,7 @@ use crate::camera::Camera;
 
 /// The scene box, in world space: an inner cube that holds the subject, doubled about its centre
 /// `cascades - 1` times to take in the background.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounds {
     /// Centre of all the cubes.
     pub center: DVec3,

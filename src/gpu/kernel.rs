@@ -3,6 +3,7 @@
 use super::Gpu;
 use super::buffer::Buffer;
 use super::source::{Binding, Linked, Source};
+use super::tensor::{Place, Tensor};
 use anyhow::{Result, anyhow, bail};
 use std::borrow::Cow;
 use wgpu::naga;
@@ -61,15 +62,13 @@ pub struct Bound {
     pub(super) group: wgpu::BindGroup,
 }
 
-/// A buffer, or a byte range of one, under the name a kernel knows it by.
-#[derive(Clone, Copy, Debug)]
+/// A buffer or a texture under the name a kernel knows it by.
+#[derive(Clone, Debug)]
 pub struct Resource<'a> {
     /// The WGSL variable's name.
     pub name: &'a str,
-    /// The buffer.
-    pub buffer: &'a Buffer,
-    /// Byte offset and length; `None` for the whole buffer.
-    pub range: Option<(u64, u64)>,
+    /// What is bound.
+    pub binding: wgpu::BindingResource<'a>,
 }
 
 impl Buffer {
@@ -82,7 +81,26 @@ impl Buffer {
     /// The whole buffer under another name.
     #[must_use]
     pub fn named<'a>(&'a self, name: &'a str) -> Resource<'a> {
-        Resource { name, buffer: self, range: None }
+        Resource { name, binding: self.raw.as_entire_binding() }
+    }
+
+    /// `length` bytes from `offset` on under another name.
+    #[must_use]
+    pub fn range<'a>(&'a self, name: &'a str, offset: u64, length: u64) -> Resource<'a> {
+        let binding = wgpu::BufferBinding { buffer: &self.raw, offset, size: wgpu::BufferSize::new(length) };
+        Resource { name, binding: wgpu::BindingResource::Buffer(binding) }
+    }
+}
+
+impl Tensor {
+    /// The tensor under a name.
+    #[must_use]
+    pub fn named<'a>(&'a self, name: &'a str) -> Resource<'a> {
+        let binding = match &self.place {
+            Place::Buffer(buffer) => buffer.as_entire_binding(),
+            Place::Texture(_, view) => wgpu::BindingResource::TextureView(view),
+        };
+        Resource { name, binding }
     }
 }
 
@@ -140,16 +158,7 @@ impl Kernel {
                 let found = resources.iter().find(|r| r.name == binding.name).ok_or_else(|| {
                     anyhow!("the kernel '{}' needs the buffer '{}'", self.label, binding.name)
                 })?;
-                let (offset, size) =
-                    found.range.map_or((0, None), |(offset, length)| (offset, wgpu::BufferSize::new(length)));
-                Ok(wgpu::BindGroupEntry {
-                    binding: index as u32,
-                    resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                        buffer: &found.buffer.raw,
-                        offset,
-                        size,
-                    }),
-                })
+                Ok(wgpu::BindGroupEntry { binding: index as u32, resource: found.binding.clone() })
             })
             .collect::<Result<Vec<_>>>()?;
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -173,11 +182,7 @@ fn layout_entries(bindings: &[Binding]) -> Vec<wgpu::BindGroupLayoutEntry> {
         .map(|(index, binding)| wgpu::BindGroupLayoutEntry {
             binding: index as u32,
             visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: binding.kind,
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
+            ty: binding.kind,
             count: None,
         })
         .collect()

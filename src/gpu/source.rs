@@ -3,6 +3,7 @@
 //! A part declares the buffers it touches without `@group` and `@binding`; the linker numbers them, and
 //! [`super::kernel::Kernel`] binds them by name.
 
+use super::tensor::{self, Element, Memory};
 use anyhow::{Result, anyhow};
 use std::fmt::{Display, Write};
 use wgpu::naga;
@@ -11,6 +12,7 @@ use wgpu::naga;
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     label: String,
+    memory: Memory,
     constants: String,
     parts: Vec<(String, String)>,
 }
@@ -22,17 +24,17 @@ pub struct Linked {
     pub label: String,
     /// The module, its buffers numbered in the order of `bindings`.
     pub module: naga::Module,
-    /// The buffers the entry point `main` reaches; the index is the binding number.
+    /// The resources the entry point `main` reaches; the index is the binding number.
     pub bindings: Vec<Binding>,
 }
 
-/// One buffer of a kernel.
+/// One buffer or texture of a kernel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Binding {
     /// The WGSL variable's name.
     pub name: String,
     /// How the kernel sees it.
-    pub kind: wgpu::BufferBindingType,
+    pub kind: wgpu::BindingType,
 }
 
 impl Source {
@@ -40,6 +42,12 @@ impl Source {
     #[must_use]
     pub fn new(label: &str) -> Self {
         Self { label: label.to_owned(), ..Self::default() }
+    }
+
+    /// Chooses where the kernel's tensors live.
+    #[must_use]
+    pub fn memory(self, memory: Memory) -> Self {
+        Self { memory, ..self }
     }
 
     /// Adds `const name = value;`, the value written as WGSL reads it (`4u`, `0.5`).
@@ -77,7 +85,13 @@ impl Source {
     pub fn text(&self) -> String {
         let mut text = self.constants.clone();
         for (name, part) in &self.parts {
-            let _ = writeln!(text, "// {name}\n{part}");
+            let _ = writeln!(text, "// {name}");
+            for line in part.lines() {
+                let _ = match tensor::expand(line, self.memory) {
+                    Some(expanded) => writeln!(text, "{expanded}"),
+                    None => writeln!(text, "{line}"),
+                };
+            }
         }
         text
     }
@@ -93,7 +107,7 @@ impl Source {
             anyhow!("linking the kernel '{}': {place}: {}", self.label, error.emit_to_string(&text))
         })?;
         for (index, (_, variable)) in module.global_variables.iter_mut().enumerate() {
-            if is_buffer(variable.space) {
+            if is_resource(variable.space) {
                 variable.binding = Some(naga::ResourceBinding { group: 0, binding: index as u32 });
             }
         }
@@ -104,25 +118,21 @@ impl Source {
         .validate(&module)
         .map_err(|error| anyhow!("checking the kernel '{}': {}", self.label, error.emit_to_string(&text)))?;
         let entry = info.get_entry_point(0);
-        let mut bindings = Vec::new();
-        for (handle, variable) in module.global_variables.iter_mut() {
-            variable.binding = None;
-            if is_buffer(variable.space) && !entry[handle].is_empty() {
-                let binding = bindings.len() as u32;
-                variable.binding = Some(naga::ResourceBinding { group: 0, binding });
-                bindings.push(Binding {
-                    name: variable.name.clone().unwrap_or_default(),
-                    kind: binding_type(variable.space),
-                });
-            }
-        }
         // What the entry point does not reach gets numbers behind the used ones, to stay valid.
-        let mut next = bindings.len() as u32;
-        for (_, variable) in module.global_variables.iter_mut() {
-            if is_buffer(variable.space) && variable.binding.is_none() {
-                variable.binding = Some(naga::ResourceBinding { group: 0, binding: next });
-                next += 1;
-            }
+        let (used, unused): (Vec<_>, Vec<_>) = module
+            .global_variables
+            .iter()
+            .filter(|(_, variable)| is_resource(variable.space))
+            .map(|(handle, _)| handle)
+            .partition(|&handle| !entry[handle].is_empty());
+        let bindings = used.iter().map(|&handle| {
+            let variable = &module.global_variables[handle];
+            Binding { name: variable.name.clone().unwrap_or_default(), kind: binding_type(&module, variable) }
+        });
+        let bindings = bindings.collect();
+        for (binding, handle) in used.into_iter().chain(unused).enumerate() {
+            let resource = naga::ResourceBinding { group: 0, binding: binding as u32 };
+            module.global_variables[handle].binding = Some(resource);
         }
         Ok(Linked { label: self.label.clone(), module, bindings })
     }
@@ -132,24 +142,56 @@ impl Source {
         let mut first = self.constants.lines().count() as u32 + 1;
         for (name, part) in &self.parts {
             let length = part.lines().count() as u32 + 1;
-            if line < first + length + 1 {
-                return format!("{name}:{}", line.saturating_sub(first));
+            if line < first + length {
+                return format!("{name}:{}", line - first);
             }
-            first += length + u32::from(part.ends_with('\n'));
+            first += length;
         }
         "constants".to_owned()
     }
 }
 
-fn is_buffer(space: naga::AddressSpace) -> bool {
-    matches!(space, naga::AddressSpace::Storage { .. } | naga::AddressSpace::Uniform)
+fn is_resource(space: naga::AddressSpace) -> bool {
+    use naga::AddressSpace as Space;
+    matches!(space, Space::Storage { .. } | Space::Uniform | Space::Handle)
 }
 
-fn binding_type(space: naga::AddressSpace) -> wgpu::BufferBindingType {
-    match space {
-        naga::AddressSpace::Storage { access } => {
-            wgpu::BufferBindingType::Storage { read_only: !access.contains(naga::StorageAccess::STORE) }
+fn binding_type(module: &naga::Module, variable: &naga::GlobalVariable) -> wgpu::BindingType {
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    match (variable.space, &module.types[variable.ty].inner) {
+        (naga::AddressSpace::Storage { access }, _) => buffer(wgpu::BufferBindingType::Storage {
+            read_only: !access.contains(naga::StorageAccess::STORE),
+        }),
+        (_, naga::TypeInner::Image { class: naga::ImageClass::Storage { format, access }, .. }) => {
+            wgpu::BindingType::StorageTexture {
+                access: if access.contains(naga::StorageAccess::LOAD) {
+                    wgpu::StorageTextureAccess::ReadWrite
+                } else {
+                    wgpu::StorageTextureAccess::WriteOnly
+                },
+                format: texture_format(*format),
+                view_dimension: wgpu::TextureViewDimension::D2,
+            }
         }
-        _ => wgpu::BufferBindingType::Uniform,
+        (_, naga::TypeInner::Image { class: naga::ImageClass::Sampled { kind, .. }, .. }) => {
+            wgpu::BindingType::Texture {
+                sample_type: match kind {
+                    naga::ScalarKind::Uint => wgpu::TextureSampleType::Uint,
+                    _ => wgpu::TextureSampleType::Float { filterable: false },
+                },
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            }
+        }
+        _ => buffer(wgpu::BufferBindingType::Uniform),
+    }
+}
+
+fn texture_format(format: naga::StorageFormat) -> wgpu::TextureFormat {
+    match format {
+        naga::StorageFormat::Rg32Float => Element::Vec2.format(),
+        naga::StorageFormat::Rg32Uint => Element::Pair.format(),
+        naga::StorageFormat::R32Uint => Element::Word.format(),
+        _ => Element::Vec4.format(),
     }
 }

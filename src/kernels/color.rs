@@ -2,9 +2,10 @@
 
 use super::density::{forward, layer_stage};
 use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
-use super::{COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, Plan, RANDOM, RAY, STEP, Workspace, dispatch};
+use super::{COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, Plan, RANDOM, STEP, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::pass::{Size, Stage};
+use crate::gpu::tensor::Element;
 use crate::model::COLOR_INPUTS;
 use anyhow::Result;
 
@@ -26,17 +27,17 @@ pub enum Selection {
 /// When the adapter cannot hold them.
 pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
     let rows = kept_capacity(plan) + SPARE_ROWS;
-    workspace.add(gpu.storage::<[u32; 2]>("chosen", plan.config.batch.samples)?);
-    workspace.add(gpu.storage::<u32>("kept_sample", rows)?);
-    workspace.add(gpu.storage::<u32>("kept_ray", rows)?);
-    workspace.add(gpu.storage::<f32>("kept_gain", rows)?);
-    workspace.add(gpu.storage::<[f32; 2]>("kept_steps", rows)?);
-    workspace.add(gpu.storage::<f32>("color_input", rows * COLOR_INPUTS)?);
-    for name in COLOR_HIDDEN.iter().take(plan.config.network.color_layers) {
-        workspace.add(gpu.storage::<f32>(name, rows * plan.config.network.width)?);
-    }
-    workspace.add(gpu.storage::<[f32; 4]>("color", rows)?);
-    Ok(())
+    let width = plan.config.network.width;
+    let tensors = [
+        ("chosen", Element::Pair, plan.config.batch.samples),
+        ("kept_rows", Element::Pair, rows),
+        ("kept_steps", Element::Vec4, rows),
+        ("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
+        ("color", Element::Vec4, rows),
+    ];
+    plan.allocate(gpu, workspace, &tensors)?;
+    let hidden = COLOR_HIDDEN.map(|name| (name, Element::Vec4, rows * width / 4));
+    plan.allocate(gpu, workspace, &hidden[..plan.config.network.color_layers])
 }
 
 /// Selects, packs and colours.
@@ -56,7 +57,7 @@ pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selectio
         format!("const WEIGHT_FLOOR = f32({floor:?});"),
     )?;
     let kept = plan.kernel(gpu, "kept", &[COUNTERS, DENSITY, part!("kept.wgsl")])?;
-    let input = plan.kernel(gpu, "color input", &[COUNTERS, RAY, HARMONICS, part!("color_input.wgsl")])?;
+    let input = plan.kernel(gpu, "color input", &[COUNTERS, HARMONICS, part!("color_input.wgsl")])?;
     let sizes = workspace.get("dispatch");
     let mut stages = vec![
         Stage::indirect(workspace.bind(gpu, &select, &[])?, sizes, dispatch::RAYS),

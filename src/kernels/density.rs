@@ -1,11 +1,12 @@
 //! The density network over all marched samples: encoding and two layers.
 
 use super::marching::SPARE_ROWS;
-use super::{COUNT_SAMPLES, COUNTERS, GRID, Plan, Workspace, dispatch, layer};
+use super::{COUNT_SAMPLES, COUNTERS, GRID, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::kernel::{Kernel, Resource};
 use crate::gpu::pass::{Size, Stage};
+use crate::gpu::tensor::Element;
 use crate::model::{DENSITY_OUTPUTS, Layer};
 use anyhow::Result;
 
@@ -15,10 +16,12 @@ use anyhow::Result;
 /// When the adapter cannot hold them.
 pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
     let rows = plan.config.batch.samples + SPARE_ROWS;
-    workspace.add(gpu.storage::<f32>("encoding", rows * plan.layout.encoding())?);
-    workspace.add(gpu.storage::<f32>("density_hidden", rows * plan.config.network.width)?);
-    workspace.add(gpu.storage::<f32>("density_out", rows * DENSITY_OUTPUTS)?);
-    Ok(())
+    let tensors = [
+        ("encoding", Element::Vec4, rows * plan.layout.encoding() / 4),
+        ("density_hidden", Element::Vec4, rows * plan.config.network.width / 4),
+        ("density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
+    ];
+    plan.allocate(gpu, workspace, &tensors)
 }
 
 /// Allocates the parameters: table, weights and the levels' description.
@@ -29,11 +32,13 @@ pub fn allocate_parameters(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) ->
     let levels = gpu.uniform_storage::<crate::model::Level>("levels", plan.layout.levels.len())?;
     gpu.write(&levels, 0, &plan.layout.levels);
     workspace.add(levels);
-    workspace.add(gpu.storage::<[f32; 2]>("table", plan.layout.entries)?);
     workspace.add(gpu.uniform_storage::<[f32; 4]>("mlp", plan.layout.quads)?);
     workspace.add(gpu.storage::<f32>("occupancy", plan.cell_count())?);
-    workspace.add(gpu.storage::<u32>("occupancy_bits", plan.cell_count() / 32)?);
-    Ok(())
+    let tensors = [
+        ("table", Element::Vec2, plan.layout.entries),
+        ("occupancy_bits", Element::Word, plan.cell_count() / 32),
+    ];
+    plan.allocate(gpu, workspace, &tensors)
 }
 
 /// Encodes the samples and runs the density network on them.
@@ -47,7 +52,7 @@ pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage
     let out = forward(gpu, plan, "density out", &plan.layout.density[1], &FORWARD_LINEAR)?;
     let tiles = Size::Indirect(sizes.clone(), dispatch::SAMPLE_TILES);
     Ok(vec![
-        Stage::indirect(workspace.bind(gpu, &encode, &[])?, sizes, dispatch::SAMPLES),
+        Stage::indirect(workspace.bind(gpu, &encode, &[])?, sizes, dispatch::ENCODE),
         layer_stage(
             gpu,
             workspace,
@@ -77,7 +82,7 @@ const FORWARD_LINEAR: [super::Part; 4] =
 /// # Errors
 /// When it cannot be built.
 pub fn forward(gpu: &Gpu, plan: &Plan, label: &str, layer: &Layer, parts: &[super::Part]) -> Result<Kernel> {
-    let text = layer::forward(layer.inputs, layer.outputs, plan.samples_per_thread);
+    let text = plan.product.forward(layer.inputs, layer.outputs);
     plan.generated_kernel(gpu, label, parts, &quads(layer), text)
 }
 
@@ -104,6 +109,5 @@ pub fn layer_stage(
 }
 
 fn weights<'a>(mlp: &'a Buffer, layer: &Layer) -> Resource<'a> {
-    let range = ((layer.first_quad * 16) as u64, (layer.quads() * 16) as u64);
-    Resource { name: "layer_weights", buffer: mlp, range: Some(range) }
+    mlp.range("layer_weights", (layer.first_quad * 16) as u64, (layer.quads() * 16) as u64)
 }

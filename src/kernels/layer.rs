@@ -17,61 +17,116 @@ macro_rules! line {
     }};
 }
 
-/// `layer_store(row, o, Σ_k W[o][k] x[k])` for `samples` rows per thread. The weights are
-/// `array<vec4<f32>, outputs / 4 * inputs>`, see [`crate::model::Layer`].
-#[must_use]
-pub fn forward(inputs: usize, outputs: usize, samples: usize) -> String {
-    let mut text = head(inputs * outputs / 4, samples);
-    for sample in 0..samples {
-        for quad in 0..inputs / 4 {
-            line!(text, "    let x{sample}_{quad} = layer_load(first + {sample}u, {quad}u);");
-        }
-    }
-    line!(text, "    for (var o = 0u; o < {}u; o++) {{", outputs / 4);
-    for sample in 0..samples {
-        line!(text, "        var sum{sample} = vec4(0.0);");
-    }
-    for input in 0..inputs {
-        line!(text, "        let w{input} = layer_weights[o * {inputs}u + {input}u];");
-        for sample in 0..samples {
-            let (quad, component) = (input / 4, COMPONENTS[input % 4]);
-            line!(text, "        sum{sample} += w{input} * x{sample}_{quad}.{component};");
-        }
-    }
-    for sample in 0..samples {
-        line!(text, "        layer_store(first + {sample}u, o, sum{sample});");
-    }
-    text.push_str("    }\n}\n");
-    text
+/// How a thread multiplies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Product {
+    /// Rows per thread.
+    pub rows: usize,
+    /// Eight threads read eight weights together and pass them on, which software drivers with subgroups do
+    /// several times faster than each reading all.
+    pub shared_weights: bool,
 }
 
-/// `layer_d_store(row, k, Σ_o W[o][k] d[o])` for the first `wanted` inputs.
-#[must_use]
-pub fn backward(inputs: usize, wanted: usize, outputs: usize, samples: usize) -> String {
-    let mut text = head(inputs * outputs / 4, samples);
-    for sample in 0..samples {
-        for quad in 0..outputs / 4 {
-            line!(text, "    let d{sample}_{quad} = layer_gradient(first + {sample}u, {quad}u);");
-        }
-    }
-    line!(text, "    for (var k = 0u; k < {}u; k++) {{", wanted / 4);
-    for sample in 0..samples {
-        line!(text, "        var sum{sample} = vec4(0.0);");
-    }
-    for quad in 0..outputs / 4 {
-        for (component, name) in COMPONENTS.iter().enumerate() {
-            let offset = quad * inputs + component;
-            line!(text, "        let w{quad}_{component} = layer_weights[4u * k + {offset}u];");
-            for sample in 0..samples {
-                line!(text, "        sum{sample}.{name} += dot(w{quad}_{component}, d{sample}_{quad});");
+/// Weights that threads read together.
+const SHARED: usize = 8;
+
+impl Product {
+    /// `layer_store(row, o, Σ_k W[o][k] x[k])`. The weights are `array<vec4<f32>, outputs / 4 * inputs>`, see
+    /// [`crate::model::Layer`].
+    #[must_use]
+    pub fn forward(self, inputs: usize, outputs: usize) -> String {
+        let mut text = self.head(inputs * outputs / 4);
+        for row in 0..self.rows {
+            for quad in 0..inputs / 4 {
+                line!(text, "    let x{row}_{quad} = layer_load(first + {row}u, {quad}u);");
             }
         }
+        line!(text, "    for (var o = 0u; o < {}u; o++) {{", outputs / 4);
+        self.zero_sums(&mut text);
+        for input in 0..inputs {
+            let start = input - input % SHARED;
+            let together = format!("o * {inputs}u + {start}u + lane");
+            self.weight(&mut text, input, &format!("o * {inputs}u + {input}u"), &together);
+            for row in 0..self.rows {
+                let (quad, component) = (input / 4, COMPONENTS[input % 4]);
+                line!(text, "        sum{row} += w{input} * x{row}_{quad}.{component};");
+            }
+        }
+        for row in 0..self.rows {
+            line!(text, "        layer_store(first + {row}u, o, sum{row});");
+        }
+        text.push_str("    }\n}\n");
+        text
     }
-    for sample in 0..samples {
-        line!(text, "        layer_d_store(first + {sample}u, k, sum{sample});");
+
+    /// `layer_d_store(row, k, Σ_o W[o][k] d[o])` for the first `wanted` inputs.
+    #[must_use]
+    pub fn backward(self, inputs: usize, wanted: usize, outputs: usize) -> String {
+        let mut text = self.head(inputs * outputs / 4);
+        let quads = outputs / 4;
+        for row in 0..self.rows {
+            for quad in 0..quads {
+                line!(text, "    let d{row}_{quad} = layer_gradient(first + {row}u, {quad}u);");
+            }
+        }
+        line!(text, "    for (var k = 0u; k < {}u; k++) {{", wanted / 4);
+        self.zero_sums(&mut text);
+        for number in 0..outputs {
+            let (quad, component) = (number / 4, number % 4);
+            let first = (quad - quad % 2) * inputs;
+            // Two quads of outputs at once; the last one alone where their number is odd.
+            let second = if quad - quad % 2 + 1 < quads { inputs } else { 0 };
+            let together = format!("4u * k + {first}u + lane % 4u + (lane / 4u) * {second}u");
+            let own = format!("4u * k + {}u", quad * inputs + component);
+            self.weight(&mut text, number, &own, &together);
+            for row in 0..self.rows {
+                let name = COMPONENTS[component];
+                line!(text, "        sum{row}.{name} += dot(w{number}, d{row}_{quad});");
+            }
+        }
+        for row in 0..self.rows {
+            line!(text, "        layer_d_store(first + {row}u, k, sum{row});");
+        }
+        text.push_str("    }\n}\n");
+        text
     }
-    text.push_str("    }\n}\n");
-    text
+
+    /// Reads weight number `number`: from index `own`, or out of the eight read from index `together`.
+    fn weight(self, text: &mut String, number: usize, own: &str, together: &str) {
+        if !self.shared_weights {
+            line!(text, "        let w{number} = layer_weights[{own}];");
+            return;
+        }
+        let (group, member) = (number / SHARED, number % SHARED);
+        if member == 0 {
+            line!(text, "        let shared{group} = layer_weights[{together}];");
+        }
+        line!(text, "        let w{number} = subgroupBroadcast(shared{group}, {member}u);");
+    }
+
+    fn zero_sums(self, text: &mut String) {
+        for row in 0..self.rows {
+            line!(text, "        var sum{row} = vec4(0.0);");
+        }
+    }
+
+    /// All threads of a workgroup go on or none: subgroups need all their members.
+    fn head(self, weights: usize) -> String {
+        let rows = self.rows;
+        let (argument, lane) = if self.shared_weights {
+            (", @builtin(subgroup_invocation_id) invocation: u32", "    let lane = invocation % 8u;\n")
+        } else {
+            ("", "")
+        };
+        format!(
+            "var<uniform> layer_weights: array<vec4<f32>, {weights}>;\n\
+             @compute @workgroup_size(64)\n\
+             fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>{argument}) {{\n    \
+                 let first = id.x * {rows}u;\n    \
+                 if group.x * {}u >= layer_count() {{\n        return;\n    }}\n{lane}",
+            64 * rows
+        )
+    }
 }
 
 /// One tile of `Σ_rows x[k] d[o]`: [`TILE_INPUTS`] inputs by `quads` quads of outputs, over one chunk of rows.
@@ -86,10 +141,10 @@ pub fn weight_gradient(quads: usize) -> String {
     }
     text.push_str("    for (var row = begin; row < end; row++) {\n        let source = tile_row(row);\n");
     for quad in 0..TILE_INPUTS / 4 {
-        line!(text, "        let x{quad} = layer_input[source * tile.input_quads + input + {quad}u];");
+        line!(text, "        let x{quad} = layer_input_load(source * tile.input_quads + input + {quad}u);");
     }
     for quad in 0..quads {
-        line!(text, "        let d{quad} = d_output[row * tile.output_quads + output + {quad}u];");
+        line!(text, "        let d{quad} = d_output_load(row * tile.output_quads + output + {quad}u);");
     }
     for input in 0..TILE_INPUTS {
         for quad in 0..quads {
@@ -101,7 +156,7 @@ pub fn weight_gradient(quads: usize) -> String {
     for quad in 0..quads {
         line!(text, "    let at{quad} = base + (output + {quad}u) * tile.input_quads * 4u + input * 4u;");
         for input in 0..TILE_INPUTS {
-            line!(text, "    d_weight_chunks[at{quad} + {input}u] = sum{input}_{quad};");
+            line!(text, "    d_weight_chunks_store(at{quad} + {input}u, sum{input}_{quad});");
         }
     }
     text.push_str("}\n");
@@ -109,16 +164,6 @@ pub fn weight_gradient(quads: usize) -> String {
 }
 
 const COMPONENTS: [&str; 4] = ["x", "y", "z", "w"];
-
-fn head(weights: usize, samples: usize) -> String {
-    format!(
-        "var<uniform> layer_weights: array<vec4<f32>, {weights}>;\n\
-         @compute @workgroup_size(64)\n\
-         fn main(@builtin(global_invocation_id) id: vec3<u32>) {{\n    \
-             let first = id.x * {samples}u;\n    \
-             if first >= layer_count() {{\n        return;\n    }}\n"
-    )
-}
 
 const TILE_HEAD: &str = "\
 @compute @workgroup_size(8)

@@ -1,12 +1,15 @@
 //! From rays to samples: marching through the occupancy grid, and the scan that packs the samples.
 
-use super::{COUNTERS, Counters, MARCH_START, OCCUPANCY, Plan, RANDOM, RAY, STEP, Step, Workspace, dispatch};
+use super::{
+    COUNTERS, Counters, MARCH_START, OCCUPANCY, Plan, RANDOM, RAY, RAY_LOAD, STEP, Step, Workspace, dispatch,
+};
 use crate::gpu::Gpu;
 use crate::gpu::pass::Stage;
+use crate::gpu::tensor::Element;
 use anyhow::Result;
 
 /// Room behind the last sample for the rows that the last thread of a matrix product computes in vain.
-pub const SPARE_ROWS: usize = 64;
+pub const SPARE_ROWS: usize = 1024;
 
 /// Allocates rays, their spans and the samples.
 ///
@@ -17,12 +20,15 @@ pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()>
     workspace.add(gpu.uniform("step", &Step::default())?);
     workspace.add(gpu.storage::<Counters>("counters", 1)?);
     workspace.add(gpu.indirect("dispatch", dispatch::COUNT * 4)?);
-    workspace.add(gpu.storage::<[f32; 8]>("rays", batch.rays)?);
     workspace.add(gpu.storage::<u32>("ray_steps", batch.rays * plan.step_words())?);
     workspace.add(gpu.storage::<[u32; 2]>("ray_spans", batch.rays)?);
     workspace.add(gpu.storage::<[u32; 2]>("kept_spans", batch.rays)?);
-    workspace.add(gpu.storage::<[f32; 4]>("samples", batch.samples + SPARE_ROWS)?);
-    Ok(())
+    let tensors = [
+        ("ray_origins", Element::Vec4, batch.rays),
+        ("ray_directions", Element::Vec4, batch.rays),
+        ("samples", Element::Vec4, batch.samples + SPARE_ROWS),
+    ];
+    plan.allocate(gpu, workspace, &tensors)
 }
 
 /// Marches the rays and writes their samples; `jitter` shifts each ray's samples at random.
@@ -35,12 +41,23 @@ pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, jitter: bool) -> Re
     let march = plan.kernel(
         gpu,
         "march",
-        &[RANDOM, STEP, COUNTERS, RAY, OCCUPANCY, stepping, MARCH_START, jitter, part!("march.wgsl")],
+        &[
+            RANDOM,
+            STEP,
+            COUNTERS,
+            RAY,
+            RAY_LOAD,
+            OCCUPANCY,
+            stepping,
+            MARCH_START,
+            jitter,
+            part!("march.wgsl"),
+        ],
     )?;
     let samples = plan.kernel(
         gpu,
         "samples",
-        &[RANDOM, STEP, COUNTERS, RAY, stepping, MARCH_START, jitter, part!("samples.wgsl")],
+        &[RANDOM, STEP, COUNTERS, RAY, RAY_LOAD, stepping, MARCH_START, jitter, part!("samples.wgsl")],
     )?;
     let sizes = workspace.get("dispatch");
     Ok(vec![

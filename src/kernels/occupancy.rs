@@ -10,8 +10,14 @@ use anyhow::Result;
 pub struct Update {
     chunk: Vec<Stage>,
     bits: Vec<Stage>,
-    samples_per_thread: usize,
+    level_pairs: usize,
+    rows_per_thread: usize,
 }
+
+// Positions in the list of stages of a chunk: samples, encode, two layers, update.
+const ENCODE: usize = 1;
+const ENCODE_END: usize = 2;
+const LAYERS_END: usize = 4;
 
 /// Allocates what only the update needs.
 ///
@@ -44,18 +50,20 @@ impl Update {
                 Stage::fixed(workspace.bind(gpu, &mean, &[])?, 1, 1),
                 Stage::fixed(workspace.bind(gpu, &bits, &[])?, words.div_ceil(64), 1),
             ],
-            samples_per_thread: plan.samples_per_thread,
+            level_pairs: plan.layout.levels.len() / 2,
+            rows_per_thread: plan.product.rows,
         })
     }
 
     /// The stages for a chunk of `cells` cells.
     pub fn chunk(&mut self, cells: usize) -> &[Stage] {
-        let last = self.chunk.len() - 1;
         for (index, stage) in self.chunk.iter_mut().enumerate() {
-            let layer = index == 2 || index == 3;
-            let per_group = if layer { 64 * self.samples_per_thread } else { 64 };
-            debug_assert!(index <= last);
-            stage.size = Size::Fixed(cells.div_ceil(per_group) as u32, 1);
+            let (per_group, rows) = match index {
+                ENCODE => (64, self.level_pairs),
+                ENCODE_END..LAYERS_END => (64 * self.rows_per_thread, 1),
+                _ => (64, 1),
+            };
+            stage.size = Size::Fixed(cells.div_ceil(per_group) as u32, rows as u32);
         }
         &self.chunk
     }

@@ -4,14 +4,15 @@ use super::color::COLOR_HIDDEN;
 use super::density::{layer_stage, quads};
 use super::marching::{SPARE_ROWS, kept_capacity};
 use super::{
-    ADAM, CAMERA, CHUNKS, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, STEP, Workspace,
-    dispatch, layer,
+    ADAM, CAMERA, CHUNKS, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_STORE, STEP,
+    Workspace, dispatch, layer,
 };
 use crate::config::Accumulation;
 use crate::gpu::Gpu;
 use crate::gpu::pass::{Size, Stage};
+use crate::gpu::tensor::{Element, Memory};
 use crate::gpu_struct;
-use crate::model::{DENSITY_OUTPUTS, FEATURES, Layer};
+use crate::model::{DENSITY_OUTPUTS, Layer};
 use anyhow::Result;
 
 gpu_struct! {
@@ -51,20 +52,21 @@ pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()>
     for name in ["targets", "backgrounds", "rendered", "ray_errors"] {
         workspace.add(gpu.storage::<[f32; 4]>(name, batch.rays)?);
     }
-    for name in ["d_color", "d_raw_color"] {
-        workspace.add(gpu.storage::<[f32; 4]>(name, rows)?);
-    }
-    for name in D_COLOR_HIDDEN.iter().take(plan.config.network.color_layers) {
-        workspace.add(gpu.storage::<f32>(name, rows * width)?);
-    }
-    workspace.add(gpu.storage::<f32>("d_density_out", rows * DENSITY_OUTPUTS)?);
-    workspace.add(gpu.storage::<f32>("d_density_hidden", rows * width)?);
-    workspace.add(gpu.storage::<f32>("d_encoding", rows * layout.encoding())?);
-    workspace.add(gpu.storage::<[f32; 4]>("d_weight_chunks", CHUNKS * layout.quads)?);
-    workspace.add(gpu.storage::<[f32; FEATURES]>("d_table", layout.entries)?);
-    for name in ["table_first", "table_second"] {
-        workspace.add(gpu.storage::<[f32; FEATURES]>(name, layout.entries)?);
-    }
+    let tensors = [
+        ("d_color", Element::Vec4, rows),
+        ("d_raw_color", Element::Vec4, rows),
+        ("d_density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
+        ("d_density_hidden", Element::Vec4, rows * width / 4),
+        ("d_encoding", Element::Vec4, rows * layout.encoding() / 4),
+        ("d_weight_chunks", Element::Vec4, CHUNKS * layout.quads),
+        ("table_moments", Element::Vec4, layout.entries),
+    ];
+    plan.allocate(gpu, workspace, &tensors)?;
+    let hidden = D_COLOR_HIDDEN.map(|name| (name, Element::Vec4, rows * width / 4));
+    plan.allocate(gpu, workspace, &hidden[..plan.config.network.color_layers])?;
+    let ordered = plan.accumulation == Accumulation::Ordered;
+    let memory = if ordered { plan.memory } else { Memory::Buffers };
+    workspace.add_tensor(gpu.tensor("d_table", Element::Vec2, layout.entries, memory)?);
     for name in ["mlp_first", "mlp_second"] {
         workspace.add(gpu.storage::<[f32; 4]>(name, layout.quads)?);
     }
@@ -81,6 +83,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
         STEP,
         COUNTERS,
         RAY,
+        RAY_STORE,
         CAMERA,
         plan.lens(),
         plan.pixels(),
@@ -149,7 +152,7 @@ fn backward_layer(
     parts: &[Part],
     renamed: &[(&str, &str)],
 ) -> Result<Stage> {
-    let text = layer::backward(shape.inputs, wanted, shape.outputs, plan.samples_per_thread);
+    let text = plan.product.backward(shape.inputs, wanted, shape.outputs);
     let kernel = plan.generated_kernel(gpu, label, parts, &quads(shape), text)?;
     let size = Size::Indirect(workspace.get("dispatch").clone(), dispatch::KEPT_TILES);
     layer_stage(gpu, workspace, &kernel, shape, renamed, size)
@@ -204,30 +207,40 @@ pub fn weight_gradients(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result
 /// # Errors
 /// When a kernel cannot be built.
 pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
-    let gradient = plan.gradient();
-    let scatter = plan.kernel(gpu, "scatter", &[COUNTERS, GRID, gradient, part!("scatter.wgsl")])?;
-    let table =
-        plan.kernel(gpu, "adam table", &[STEP, COUNTERS, ADAM, gradient, part!("adam_table.wgsl")])?;
+    let [add, take] = plan.gradient();
+    let mut parts = vec![COUNTERS, GRID, add];
+    if plan.accumulation != Accumulation::Ordered {
+        parts.push(part!("scatter.wgsl"));
+    }
+    let scatter = plan.kernel(gpu, "scatter", &parts)?;
+    let table = plan.kernel(gpu, "adam table", &[STEP, COUNTERS, ADAM, take, part!("adam_table.wgsl")])?;
     let mlp = plan.kernel(gpu, "adam mlp", &[STEP, ADAM, part!("adam_mlp.wgsl")])?;
     let finish = plan.kernel(gpu, "finish", &[COUNTERS, part!("finish.wgsl")])?;
     let sizes = workspace.get("dispatch");
+    let scatter = workspace.bind(gpu, &scatter, &[])?;
+    let scatter = match plan.accumulation {
+        Accumulation::Ordered => Stage::fixed(scatter, plan.layout.levels.len() / 8, 1),
+        _ => Stage::indirect(scatter, sizes, dispatch::KEPT),
+    };
+    let groups = plan.layout.entries.div_ceil(128);
+    let columns = groups.min(1 << 15);
     Ok(vec![
-        Stage::indirect(workspace.bind(gpu, &scatter, &[])?, sizes, dispatch::KEPT),
-        Stage::fixed(workspace.bind(gpu, &table, &[])?, plan.layout.entries.div_ceil(128), 1),
+        scatter,
+        Stage::fixed(workspace.bind(gpu, &table, &[])?, columns, groups.div_ceil(columns)),
         Stage::fixed(workspace.bind(gpu, &mlp, &[])?, plan.layout.quads.div_ceil(8), 1),
         Stage::fixed(workspace.bind(gpu, &finish, &[])?, 1, 1),
     ])
 }
 
-/// Names of the buffers that hold the state of a training, apart from the counters.
-pub const STATE: [&str; 7] =
-    ["table", "table_first", "table_second", "mlp", "mlp_first", "mlp_second", "occupancy"];
+/// Names of the tensors and buffers that hold the state of a training, apart from the counters.
+pub const STATE: [&str; 6] = ["table", "table_moments", "mlp", "mlp_first", "mlp_second", "occupancy"];
 
 /// Describes how the table's gradients are summed.
 #[must_use]
 pub fn accumulation_name(accumulation: Accumulation) -> &'static str {
     match accumulation {
         Accumulation::Fixed => "fixed-point gradients",
+        Accumulation::Ordered => "ordered gradients",
         Accumulation::Float => "float-atomic gradients",
         Accumulation::Auto | Accumulation::Exchange => "compare-exchange gradients",
     }

@@ -1,6 +1,6 @@
 //! What only rendering needs: a view's rays and its compositing.
 
-use super::{CAMERA, COUNTERS, Camera, EXP, Plan, RAY, STEP, Workspace, dispatch};
+use super::{CAMERA, COUNTERS, Camera, EXP, Plan, RAY, RAY_STORE, STEP, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::pass::Stage;
 use anyhow::Result;
@@ -22,7 +22,7 @@ pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()>
 /// # Errors
 /// When the kernel cannot be built.
 pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [STEP, COUNTERS, RAY, CAMERA, plan.lens(), part!("view_rays.wgsl")];
+    let parts = [STEP, COUNTERS, RAY, RAY_STORE, CAMERA, plan.lens(), part!("view_rays.wgsl")];
     let kernel = plan.kernel(gpu, "view rays", &parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }

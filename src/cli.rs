@@ -1,0 +1,347 @@
+//! The command line: types only. Their doc comments are the help.
+
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use nerf::config::Background;
+use nerf::dataset::{HoldOut, Split};
+use std::path::PathBuf;
+
+/// Train neural radiance fields from posed photos and render new views of them.
+///
+/// Runs on any GPU with Vulkan, Metal or DX12, and on a CPU through a software driver.
+/// Results go to stdout, progress and remarks to stderr. Exit codes: 0 done, 1 failed, 2 usage.
+#[derive(Debug, Parser)]
+#[command(version, arg_required_else_help = true, propagate_version = true)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// What every command takes.
+    #[command(flatten)]
+    pub(crate) global: Global,
+}
+
+/// Options of every command.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Options of every command")]
+pub(crate) struct Global {
+    /// The adapter to run on: an index of `nerf adapters`, or a part of a name [default: the first]
+    #[arg(long, global = true, value_name = "INDEX|NAME")]
+    pub(crate) adapter: Option<String>,
+    /// Print one JSON object as the result, also when failing
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// No progress and no remarks
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+    /// More remarks
+    #[arg(long, short, global = true, action = ArgAction::Count, conflicts_with = "quiet")]
+    pub(crate) verbose: u8,
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Train a field on a dataset
+    Train(Box<Train>),
+    /// Render views of a trained field
+    Render(Render),
+    /// Measure a trained field against photos: PSNR and SSIM
+    Eval(Eval),
+    /// Write an analytic scene with exact ground truth as a dataset
+    Generate(Generate),
+    /// List the adapters of this machine
+    Adapters,
+}
+
+/// `nerf train`
+#[derive(Args, Debug)]
+pub(crate) struct Train {
+    /// A folder with transforms.json or transforms_train.json, or such a file
+    pub(crate) dataset: PathBuf,
+    /// Folder to write config.json, checkpoint.safetensors and log.jsonl to
+    #[arg(long, value_name = "RUN")]
+    pub(crate) out: PathBuf,
+    /// JSON file with the settings that differ from the defaults
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// Change one setting, for example grid.levels=8; may be repeated
+    #[arg(long, value_name = "KEY.PATH=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Stop after this many steps, those before --resume included [default: 20000 on a GPU]
+    #[arg(long, value_name = "N")]
+    pub(crate) steps: Option<u32>,
+    /// Stop after this many seconds of training, those before --resume included [default: 300 on a CPU]
+    ///
+    /// Loading, compiling, evaluating and saving do not count. The learning rate falls along a cosine that
+    /// ends where the training does; with --steps too, whichever is nearer to its end counts.
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    pub(crate) seconds: Option<f64>,
+    /// Seed of every random number
+    #[arg(long, value_name = "K")]
+    pub(crate) seed: Option<u32>,
+    /// Measure a few test views every N steps
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) eval_every: Option<u32>,
+    /// What lies behind transparent photos: black, white, random or r,g,b in 0..1
+    #[arg(long, value_name = "COLOR", value_parser = training_background)]
+    pub(crate) background: Option<Background>,
+    /// Without a test split, keep every N-th frame for testing, or none
+    #[arg(long, value_name = "N|none", default_value = "8", value_parser = hold_out)]
+    pub(crate) hold_out: HoldOut,
+    /// Go on with the training in RUN
+    #[arg(long, conflicts_with = "overwrite")]
+    pub(crate) resume: bool,
+    /// Replace the training in RUN
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    /// Do not measure the test views at the end
+    #[arg(long)]
+    pub(crate) no_eval: bool,
+}
+
+/// `nerf render`
+#[derive(Args, Debug)]
+pub(crate) struct Render {
+    /// The folder that `nerf train` wrote, or a checkpoint in it
+    #[arg(value_name = "RUN|CHECKPOINT")]
+    pub(crate) run: PathBuf,
+    /// Folder to write 0000.png, … and frames.json to
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Where to look from.
+    #[command(flatten)]
+    pub(crate) path: CameraPath,
+    /// File format; may be repeated
+    #[arg(long, value_enum, default_value = "png")]
+    pub(crate) format: Vec<Format>,
+    /// Write half floats to OpenEXR; depth stays float
+    #[arg(long)]
+    pub(crate) half: bool,
+    /// Also write depth as a grey PNG, white near and black far
+    #[arg(long)]
+    pub(crate) depth: bool,
+    /// Width in pixels; alone, the height follows [default: the file's, else the training's]
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
+    pub(crate) width: Option<u32>,
+    /// Height in pixels; alone, the width follows
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
+    pub(crate) height: Option<u32>,
+    /// Only frames A to B - 1, counted from 0
+    #[arg(long, value_name = "A..B", value_parser = frames)]
+    pub(crate) frames: Option<(usize, usize)>,
+    /// What to put behind the PNG files: transparent, black, white or r,g,b in 0..1
+    #[arg(long, value_name = "COLOR", default_value = "transparent", value_parser = picture_background)]
+    pub(crate) background: PictureBackground,
+}
+
+/// The cameras to render.
+#[derive(Args, Debug)]
+#[group(required = true, multiple = false)]
+pub(crate) struct CameraPath {
+    /// The cameras of a transforms.json
+    #[arg(long, value_name = "FILE")]
+    pub(crate) cameras: Option<PathBuf>,
+    /// N cameras in a circle around the scene
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) orbit: Option<u32>,
+}
+
+/// `nerf eval`
+#[derive(Args, Debug)]
+pub(crate) struct Eval {
+    /// The folder that `nerf train` wrote, or a checkpoint in it
+    #[arg(value_name = "RUN|CHECKPOINT")]
+    pub(crate) run: PathBuf,
+    /// The dataset with the photos to compare with
+    pub(crate) dataset: PathBuf,
+    /// The views to compare
+    #[arg(long, value_enum, default_value = "test")]
+    pub(crate) split: SplitName,
+    /// What to put behind photo and rendering
+    #[arg(long, value_enum, default_value = "black")]
+    pub(crate) background: Shade,
+    /// Write the renderings, over the background, as PNG to this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) save: Option<PathBuf>,
+}
+
+/// `nerf generate`
+#[derive(Args, Debug)]
+pub(crate) struct Generate {
+    /// Name of the scene; see --list
+    #[arg(required_unless_present = "list")]
+    pub(crate) scene: Option<String>,
+    /// New or empty folder to write the dataset to
+    #[arg(long, value_name = "DIR", required_unless_present = "list")]
+    pub(crate) out: Option<PathBuf>,
+    /// List the scenes
+    #[arg(long)]
+    pub(crate) list: bool,
+    /// Views in all splits
+    #[arg(long, value_name = "N", default_value = "100")]
+    pub(crate) views: usize,
+    /// Size of the images in pixels, WxH or N for NxN
+    #[arg(long, value_name = "WxH", default_value = "200", value_parser = size)]
+    pub(crate) size: (u32, u32),
+    /// Scene-linear OpenEXR images instead of PNG
+    #[arg(long)]
+    pub(crate) hdr: bool,
+    /// Cameras with lens distortion
+    #[arg(long)]
+    pub(crate) lens: bool,
+    /// Sub-rays per pixel along each axis
+    #[arg(long, value_name = "N", default_value = "4")]
+    pub(crate) samples: u32,
+    /// Varies where the cameras are
+    #[arg(long, value_name = "K", default_value = "0")]
+    pub(crate) seed: u64,
+}
+
+/// A file format to render to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// Scene-linear R, G, B premultiplied by A, and depth Z in world units
+    Exr,
+    /// 8-bit sRGB with straight alpha
+    Png,
+}
+
+/// A split by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SplitName {
+    /// Views that were held out
+    Test,
+    /// Views to choose settings by
+    Val,
+    /// Views that were trained on
+    Train,
+}
+
+/// What to measure over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Shade {
+    /// Black
+    Black,
+    /// White
+    White,
+}
+
+/// What is behind a PNG.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum PictureBackground {
+    /// Nothing: the file has alpha.
+    Transparent,
+    /// A display-referred colour.
+    Color([f32; 3]),
+}
+
+impl SplitName {
+    /// The split.
+    pub(crate) fn split(self) -> Split {
+        match self {
+            Self::Test => Split::Test,
+            Self::Val => Split::Val,
+            Self::Train => Split::Train,
+        }
+    }
+}
+
+impl Shade {
+    /// Its name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Black => "black",
+            Self::White => "white",
+        }
+    }
+
+    /// Its colour.
+    pub(crate) fn color(self) -> [f32; 3] {
+        match self {
+            Self::Black => [0.0; 3],
+            Self::White => [1.0; 3],
+        }
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(|_| "expected a number".to_owned())?;
+    let is_time = seconds.is_finite() && seconds >= 0.0;
+    is_time.then_some(seconds).ok_or_else(|| "expected a number from 0 on".to_owned())
+}
+
+fn training_background(text: &str) -> Result<Background, String> {
+    match text {
+        "black" => Ok(Background::Black),
+        "white" => Ok(Background::White),
+        "random" => Ok(Background::Random),
+        other => color(other).map(Background::Color).ok_or_else(|| {
+            "expected black, white, random or three numbers from 0 to 1 like 0.5,0.5,0.5".to_owned()
+        }),
+    }
+}
+
+fn picture_background(text: &str) -> Result<PictureBackground, String> {
+    match text {
+        "transparent" => Ok(PictureBackground::Transparent),
+        "black" => Ok(PictureBackground::Color([0.0; 3])),
+        "white" => Ok(PictureBackground::Color([1.0; 3])),
+        other => color(other).map(PictureBackground::Color).ok_or_else(|| {
+            "expected transparent, black, white or three numbers from 0 to 1 like 0.5,0.5,0.5".to_owned()
+        }),
+    }
+}
+
+fn color(text: &str) -> Option<[f32; 3]> {
+    let numbers: Vec<f32> = text.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
+    let color: [f32; 3] = numbers.try_into().ok()?;
+    color.iter().all(|value| (0.0..=1.0).contains(value)).then_some(color)
+}
+
+fn hold_out(text: &str) -> Result<HoldOut, String> {
+    match text.parse() {
+        _ if text == "none" => Ok(HoldOut::None),
+        Ok(every) if every >= 2 => Ok(HoldOut::Every(every)),
+        _ => Err("expected a number from 2 on, or none".to_owned()),
+    }
+}
+
+fn frames(text: &str) -> Result<(usize, usize), String> {
+    let range = text.split_once("..").and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    range
+        .filter(|(first, end)| first < end)
+        .ok_or_else(|| "expected A..B with A below B, for example 0..10 for the first ten frames".to_owned())
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let (width, height) = text.split_once('x').unwrap_or((text, text));
+    let size = width.parse().ok().zip(height.parse().ok());
+    size.ok_or_else(|| "expected WxH or N, for example 320x240".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn values_are_understood() {
+        assert_eq!(color("0,0.5, 1"), Some([0.0, 0.5, 1.0]));
+        assert_eq!(
+            (color("0,0"), color("0,0,2"), color("a,b,c"), color("0,0,nan")),
+            (None, None, None, None)
+        );
+        assert_eq!(frames("3..5"), Ok((3, 5)));
+        assert!(frames("5..3").is_err() && frames("5").is_err() && frames("..").is_err());
+        assert_eq!((size("30x20"), size("64")), (Ok((30, 20)), Ok((64, 64))));
+        assert!(size("x").is_err() && size("3x-1").is_err());
+        assert_eq!((hold_out("none"), hold_out("5")), (Ok(HoldOut::None), Ok(HoldOut::Every(5))));
+        assert!(hold_out("1").is_err() && hold_out("all").is_err());
+        assert!(seconds("-1").is_err() && seconds("inf").is_err() && seconds("2.5") == Ok(2.5));
+    }
+}

@@ -1,0 +1,86 @@
+//! One file per subcommand: glue, printing and progress around the library.
+
+mod adapters;
+mod eval;
+mod field;
+mod generate;
+mod render;
+mod scores;
+mod train;
+
+use crate::cli::{Cli, Command, Global};
+use crate::remarks::Remarks;
+use anyhow::{Context, Result};
+use nerf::dataset::Dataset;
+use nerf::gpu::{Gpu, adapter};
+use serde_json::Value;
+use std::collections::HashMap;
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Runs the subcommand.
+pub(crate) fn run(cli: &Cli) -> Result<()> {
+    let session = Session { global: &cli.global, remarks: Remarks::new(&cli.global) };
+    match &cli.command {
+        Command::Train(args) => train::run(args, &session),
+        Command::Render(args) => render::run(args, &session),
+        Command::Eval(args) => eval::run(args, &session),
+        Command::Generate(args) => generate::run(args, &session),
+        Command::Adapters => adapters::run(&session),
+    }
+}
+
+/// What every subcommand is given.
+#[derive(Clone, Copy, Debug)]
+struct Session<'a> {
+    global: &'a Global,
+    remarks: Remarks,
+}
+
+impl Session<'_> {
+    /// Opens the adapter asked for.
+    fn open_gpu(&self) -> Result<Arc<Gpu>> {
+        let gpu = Gpu::open(&adapter::choose(self.global.adapter.as_deref())?)?;
+        let info = &gpu.info;
+        self.remarks.detail(&format!(
+            "adapter {} ({:?}, {:?}, {} {})",
+            info.name, info.device_type, info.backend, info.driver, info.driver_info
+        ));
+        Ok(Arc::new(gpu))
+    }
+
+    /// Prints the result: `json` if asked for, else `text`.
+    fn print(&self, json: &Value, text: &str) -> Result<()> {
+        let mut out = std::io::stdout().lock();
+        match self.global.json {
+            true => writeln!(out, "{json}")?,
+            false => writeln!(out, "{text}")?,
+        }
+        Ok(out.flush()?)
+    }
+}
+
+/// Creates the folder where there is none, and tries whether files can be written to it.
+fn writable_folder(path: &Path) -> Result<()> {
+    let show = path.display();
+    std::fs::create_dir_all(path).with_context(|| format!("creating the folder {show}"))?;
+    let attempt = tempfile::Builder::new().prefix(".nerf-").tempfile_in(path);
+    attempt.with_context(|| format!("the folder {show} cannot be written to"))?;
+    Ok(())
+}
+
+/// The indices of the frames called `names`, and the names that the dataset lacks.
+fn find_frames<'a>(dataset: &Dataset, names: &'a [String]) -> (Vec<usize>, Vec<&'a str>) {
+    let frames = dataset.frames.iter().enumerate().rev();
+    let indices: HashMap<_, _> = frames.map(|(index, frame)| (frame.name.as_str(), index)).collect();
+    let mut missing = Vec::new();
+    let mut found = Vec::new();
+    for name in names {
+        match indices.get(name.as_str()) {
+            Some(&index) => found.push(index),
+            None => missing.push(name.as_str()),
+        }
+    }
+    (found, missing)
+}

@@ -1,0 +1,121 @@
+//! `nerf eval`: PSNR and SSIM against photos.
+
+use super::field::Field;
+use super::scores::{Judge, Means, Score};
+use super::{Session, find_frames, writable_folder};
+use crate::cli::Eval;
+use crate::progress::Progress;
+use anyhow::{Context, Result, ensure};
+use nerf::camera::Lens;
+use nerf::dataset::{Dataset, OpenOptions, Split};
+use nerf::image::write_png_rgba8;
+use nerf::picture::{ColorSpace, opaque_srgb8};
+use serde_json::{Value, json};
+
+pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
+    let field = Field::load(&args.run, session)?;
+    let dataset = Dataset::open(&args.dataset, &OpenOptions::default())?;
+    let indices = frames(&field, &dataset, args.split.split(), session)?;
+    ensure!(
+        dataset.is_hdr == field.about.needs.hdr,
+        "the field was trained on {} images, and {} has {} images; name the dataset it was trained on",
+        range(field.about.needs.hdr),
+        args.dataset.display(),
+        range(dataset.is_hdr)
+    );
+    if let Some(folder) = &args.save {
+        writable_folder(folder)?;
+    }
+    let gpu = session.open_gpu()?;
+    let lens = indices.iter().any(|&index| dataset.frames[index].camera.lens != Lens::Pinhole);
+    let judge = Judge {
+        renderer: field.renderer(&gpu, lens)?,
+        color_space: field.color_space(),
+        background: args.background.color(),
+        dataset: &dataset,
+    };
+    let scores = measure(judge, &indices, args, session)?;
+    let means = Means::of(&scores).context("there was nothing to measure")?;
+    session.print(&report(args, &field, &scores, means), &describe(args, &scores, means, field.color_space()))
+}
+
+fn measure(
+    mut judge: Judge<'_>,
+    indices: &[usize],
+    args: &Eval,
+    session: &Session<'_>,
+) -> Result<Vec<Score>> {
+    let progress = Progress::new(session.remarks, "measuring");
+    let mut scores = Vec::with_capacity(indices.len());
+    for (number, &index) in indices.iter().enumerate() {
+        let (mut score, rendered) = judge.load_and_score(index)?;
+        if let Some(folder) = &args.save {
+            let camera = &judge.dataset.frames[index].camera;
+            let file = format!("{number:04}.png");
+            write_png_rgba8(&folder.join(&file), camera.width, camera.height, &opaque_srgb8(&rendered))?;
+            score.saved = Some(file);
+        }
+        scores.push(score);
+        progress.count(number + 1, indices.len(), "views");
+    }
+    Ok(scores)
+}
+
+/// The frames of a split as the training had it, else as the dataset has it.
+fn frames(field: &Field, dataset: &Dataset, split: Split, session: &Session<'_>) -> Result<Vec<usize>> {
+    let names = field.about.splits.names(split);
+    let (found, missing) = find_frames(dataset, names);
+    if found.is_empty() {
+        let indices = dataset.split(split).to_vec();
+        ensure!(
+            !indices.is_empty(),
+            "there are no {split:?} views, neither in the checkpoint nor in the dataset"
+        );
+        session.remarks.warn(&format!(
+            "none of the {} {split:?} views of the training is in this dataset; its own {} are measured",
+            names.len(),
+            indices.len()
+        ));
+        return Ok(indices);
+    }
+    if let Some(first) = missing.first() {
+        session.remarks.warn(&format!(
+            "{} of {} {split:?} views of the training are missing in this dataset: {first}, …",
+            missing.len(),
+            names.len()
+        ));
+    }
+    Ok(found)
+}
+
+fn range(hdr: bool) -> &'static str {
+    if hdr { "linear OpenEXR" } else { "8-bit" }
+}
+
+fn report(args: &Eval, field: &Field, scores: &[Score], means: Means) -> Value {
+    json!({
+        "psnr": means.psnr,
+        "ssim": means.ssim,
+        "background": args.background.name(),
+        "split": format!("{:?}", args.split).to_lowercase(),
+        "encoding": "sRGB, clamped to 0..1",
+        "step": field.about.step,
+        "seconds": field.about.seconds,
+        "views": scores,
+    })
+}
+
+fn describe(args: &Eval, scores: &[Score], means: Means, color_space: ColorSpace) -> String {
+    let mut lines: Vec<_> =
+        scores.iter().map(|s| format!("{}  {:.3} dB  SSIM {:.4}", s.file, s.psnr, s.ssim)).collect();
+    let encoding = if color_space == ColorSpace::Linear { ", sRGB-encoded and clamped" } else { "" };
+    lines.push(format!(
+        "mean of {} {} views over {}{encoding}: {:.3} dB  SSIM {:.4}",
+        means.views,
+        format!("{:?}", args.split).to_lowercase(),
+        args.background.name(),
+        means.psnr,
+        means.ssim
+    ));
+    lines.join("\n")
+}

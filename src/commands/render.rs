@@ -1,0 +1,150 @@
+//! `nerf render`: a trained field seen from any cameras.
+
+use super::field::Field;
+use super::{Session, writable_folder};
+use crate::cli::{Format, PictureBackground, Render};
+use crate::progress::Progress;
+use anyhow::{Result, ensure};
+use nerf::camera::{Camera, Lens};
+use nerf::dataset::{Bounds, read_cameras};
+use nerf::file::write_atomically;
+use nerf::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use nerf::picture::{ColorSpace, depth_srgb8, opaque_srgb8};
+use nerf::render::View;
+use serde_json::{Map, Value, json};
+use std::io::Write;
+
+/// A camera to render, and where it comes from.
+struct Job {
+    index: usize,
+    source: String,
+    camera: Camera,
+}
+
+/// How rendered views become files.
+struct Writer<'a> {
+    args: &'a Render,
+    color_space: ColorSpace,
+    /// Depths that are white and black in depth pictures, in world units.
+    depth_range: [f64; 2],
+}
+
+pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
+    let field = Field::load(&args.run, session)?;
+    let jobs = jobs(args, &field)?;
+    writable_folder(&args.out)?;
+    let gpu = session.open_gpu()?;
+    let lens = jobs.iter().any(|job| job.camera.lens != Lens::Pinhole);
+    let mut renderer = field.renderer(&gpu, lens)?;
+    let depth_range = depth_range(&field.about.bounds, &jobs);
+    let writer = Writer { args, color_space: field.color_space(), depth_range };
+    let progress = Progress::new(session.remarks, "rendering");
+    let mut frames = Vec::with_capacity(jobs.len());
+    for (number, job) in jobs.iter().enumerate() {
+        let view = renderer.render(&job.camera)?;
+        frames.push(writer.write(job, &view)?);
+        progress.count(number + 1, jobs.len(), "frames");
+    }
+    drop(progress);
+    let mut listing = json!({ "checkpoint": field.path.display().to_string(), "step": field.about.step });
+    if args.depth {
+        listing["depth_near"] = json!(depth_range[0]);
+        listing["depth_far"] = json!(depth_range[1]);
+    }
+    listing["frames"] = Value::Array(frames);
+    write_atomically(&args.out.join("frames.json"), |file| {
+        serde_json::to_writer_pretty(&mut *file, &listing)?;
+        Ok(file.write_all(b"\n")?)
+    })?;
+    let out = args.out.display().to_string();
+    session.print(&json!({ "out": out, "frames": jobs.len() }), &format!("{} frames in {out}", jobs.len()))
+}
+
+fn jobs(args: &Render, field: &Field) -> Result<Vec<Job>> {
+    let about = &field.about;
+    let [width, height] = about.image_size;
+    let cameras: Vec<(String, Camera)> = match (&args.path.cameras, args.path.orbit) {
+        (Some(file), _) => {
+            let default_size = [args.width, args.height].into_iter().collect::<Option<Vec<_>>>();
+            let default_size = default_size.map_or([width, height], |size| [size[0], size[1]]);
+            read_cameras(file, default_size)?
+        }
+        (None, count) => {
+            let cameras = about.orbit.cameras(about.bounds.center, count.unwrap_or(1) as usize);
+            let named = cameras.into_iter().enumerate();
+            named.map(|(index, camera)| (format!("orbit {index}"), camera)).collect()
+        }
+    };
+    let (first, end) = args.frames.unwrap_or((0, cameras.len()));
+    ensure!(
+        end <= cameras.len() && first < end,
+        "--frames expects a range within 0..{}, found {first}..{end}",
+        cameras.len()
+    );
+    let job = |(index, (source, camera)): (usize, (String, Camera))| {
+        let camera = resized(camera, args.width, args.height);
+        Job { index, source, camera }
+    };
+    Ok(cameras.into_iter().enumerate().take(end).skip(first).map(job).collect())
+}
+
+/// The camera at the size asked for; a side that is not given follows.
+fn resized(camera: Camera, width: Option<u32>, height: Option<u32>) -> Camera {
+    let follow = |side: u32, other: u32, other_was: u32| {
+        (f64::from(side) * f64::from(other) / f64::from(other_was)).round().max(1.0) as u32
+    };
+    match (width, height) {
+        (None, None) => camera,
+        (Some(width), Some(height)) => camera.resized(width, height),
+        (Some(width), None) => camera.resized(width, follow(camera.height, width, camera.width)),
+        (None, Some(height)) => camera.resized(follow(camera.width, height, camera.height), height),
+    }
+}
+
+/// The same for all frames, so that a film does not flicker: the inner cube as the cameras see it.
+fn depth_range(bounds: &Bounds, jobs: &[Job]) -> [f64; 2] {
+    let reach = 3f64.sqrt() * bounds.half;
+    let distances = jobs.iter().map(|job| job.camera.position().distance(bounds.center));
+    let (nearest, farthest) =
+        distances.fold((f64::INFINITY, 0.0f64), |(near, far), d| (near.min(d), far.max(d)));
+    [(nearest - reach).max(0.0), farthest + reach]
+}
+
+impl Writer<'_> {
+    /// Writes the files of a view and describes them.
+    fn write(&self, job: &Job, view: &View) -> Result<Value> {
+        let (stem, args) = (format!("{:04}", job.index), self.args);
+        let mut files = Map::new();
+        if args.format.contains(&Format::Png) {
+            let pixels = match args.background {
+                PictureBackground::Transparent => self.color_space.straight_srgb8(&view.color),
+                PictureBackground::Color(color) => opaque_srgb8(&self.color_space.over(&view.color, color)),
+            };
+            files.insert("png".to_owned(), self.write_png(format!("{stem}.png"), view, &pixels)?);
+        }
+        if args.format.contains(&Format::Exr) {
+            let file = format!("{stem}.exr");
+            let color = self.color_space.linear(&view.color);
+            let pixels = ExrPixels { color: &color, depth: Some(&view.depth) };
+            let precision = if args.half { Precision::Half } else { Precision::Float };
+            write_exr(&args.out.join(&file), view.width, view.height, &pixels, precision)?;
+            files.insert("exr".to_owned(), json!(file));
+        }
+        if args.depth {
+            let pixels = depth_srgb8(&view.depth, &view.color, self.depth_range.map(|z| z as f32));
+            files.insert("depth".to_owned(), self.write_png(format!("{stem}_depth.png"), view, &pixels)?);
+        }
+        Ok(json!({
+            "index": job.index,
+            "source": job.source,
+            "width": view.width,
+            "height": view.height,
+            "files": files,
+        }))
+    }
+
+    fn write_png(&self, file: String, view: &View, pixels: &[[u8; 4]]) -> Result<Value> {
+        write_png_rgba8(&self.args.out.join(&file), view.width, view.height, pixels)?;
+        Ok(Value::String(file))
+    }
+}

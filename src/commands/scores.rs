@@ -1,0 +1,80 @@
+//! Measuring rendered views against photos.
+
+use anyhow::Result;
+use nerf::dataset::Dataset;
+use nerf::image::Image;
+use nerf::metrics::{psnr, ssim};
+use nerf::picture::{ColorSpace, photo_over};
+use nerf::render::Renderer;
+use serde::Serialize;
+
+/// How well one view is rendered.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Score {
+    /// The frame's name.
+    pub(super) file: String,
+    /// In decibels, over all pixels and channels.
+    pub(super) psnr: f64,
+    /// Structural similarity.
+    pub(super) ssim: f64,
+    /// The file the rendering was saved to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) saved: Option<String>,
+}
+
+/// Means over views.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Means {
+    /// Mean of the views' PSNRs.
+    pub(super) psnr: f64,
+    /// Mean of the views' SSIMs.
+    pub(super) ssim: f64,
+    /// Number of views.
+    pub(super) views: usize,
+}
+
+impl Means {
+    /// The means of some scores; `None` of none.
+    pub(super) fn of(scores: &[Score]) -> Option<Self> {
+        let mean = |value: fn(&Score) -> f64| scores.iter().map(value).sum::<f64>() / scores.len() as f64;
+        let means = Self { psnr: mean(|s| s.psnr), ssim: mean(|s| s.ssim), views: scores.len() };
+        (!scores.is_empty()).then_some(means)
+    }
+}
+
+/// Renders frames of a dataset and compares.
+#[derive(Debug)]
+pub(super) struct Judge<'a> {
+    /// Renders the field.
+    pub(super) renderer: Renderer,
+    /// The field's colour space.
+    pub(super) color_space: ColorSpace,
+    /// What is behind photo and rendering, display-referred.
+    pub(super) background: [f32; 3],
+    /// Where the photos are.
+    pub(super) dataset: &'a Dataset,
+}
+
+impl Judge<'_> {
+    /// The score of frame `index`, whose photo is `image`, and the rendering, display-referred.
+    pub(super) fn score(&mut self, index: usize, image: &Image) -> Result<(Score, Vec<[f32; 3]>)> {
+        let frame = &self.dataset.frames[index];
+        let view = self.renderer.render(&frame.camera)?;
+        let rendered = self.color_space.over(&view.color, self.background);
+        let photo = photo_over(image, self.background);
+        let (width, height) = (view.width as usize, view.height as usize);
+        let score = Score {
+            file: frame.name.clone(),
+            psnr: psnr(&rendered, &photo),
+            ssim: ssim(&rendered, &photo, width, height),
+            saved: None,
+        };
+        Ok((score, rendered))
+    }
+
+    /// The score of frame `index`, whose photo is decoded for it.
+    pub(super) fn load_and_score(&mut self, index: usize) -> Result<(Score, Vec<[f32; 3]>)> {
+        let images = self.dataset.load_images(&[index], &|_| {})?;
+        self.score(index, &images[0])
+    }
+}

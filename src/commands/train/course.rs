@@ -1,0 +1,226 @@
+//! The course of a training: blocks of steps, and between them reports, measurements and checkpoints.
+
+use super::log::Log;
+use crate::commands::scores::{Judge, Means};
+use crate::progress::{Progress, duration, short};
+use crate::remarks::Remarks;
+use anyhow::{Context, Result, bail};
+use nerf::checkpoint::{About, Checkpoint};
+use nerf::image::Image;
+use nerf::metrics::PSNR_CAP_DB;
+use nerf::train::{StepStats, Trainer};
+use serde_json::json;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Steps between reports, each of which waits for the device.
+const BLOCK: u32 = 16;
+/// Seconds of training between checkpoints.
+const BETWEEN_CHECKPOINTS: f64 = 60.0;
+
+/// A training under way.
+#[derive(Debug)]
+pub(super) struct Course<'a> {
+    about: &'a About,
+    trainer: Trainer,
+    /// Where the rows go.
+    pub(super) log: Log,
+    checkpoint: PathBuf,
+    /// Measures test views.
+    pub(super) exam: Option<Exam<'a>>,
+    remarks: Remarks,
+    /// Seconds of training so far.
+    seconds: f64,
+    /// Step and seconds of the newest checkpoint; step 0 when there is none.
+    saved: (u32, f64),
+    loss: Option<f64>,
+    is_empty: bool,
+}
+
+/// Measures a few test views every so many steps.
+#[derive(Debug)]
+pub(super) struct Exam<'a> {
+    /// Renders and compares.
+    pub(super) judge: Judge<'a>,
+    /// Steps between measurements.
+    pub(super) every: Option<u32>,
+    /// The frames and their photos.
+    pub(super) few: Vec<(usize, Image)>,
+}
+
+/// How a training ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct End {
+    /// Steps taken, those of earlier runs included.
+    pub(super) step: u32,
+    /// Seconds of training, those of earlier runs included.
+    pub(super) seconds: f64,
+    /// The last loss; `None` when no step was taken.
+    pub(super) loss: Option<f64>,
+    /// Whether it was asked to stop before its end.
+    pub(super) interrupted: bool,
+}
+
+impl<'a> Course<'a> {
+    /// A training that stands where `about` says.
+    pub(super) fn new(
+        about: &'a About,
+        trainer: Trainer,
+        log: Log,
+        checkpoint: PathBuf,
+        remarks: Remarks,
+    ) -> Self {
+        let (seconds, saved) = (about.seconds, (about.step, about.seconds));
+        Self {
+            about,
+            trainer,
+            log,
+            checkpoint,
+            exam: None,
+            remarks,
+            seconds,
+            saved,
+            loss: None,
+            is_empty: false,
+        }
+    }
+
+    /// Trains until the budget is spent or Ctrl-C is pressed, and saves.
+    pub(super) fn run(&mut self) -> Result<End> {
+        let stop = stop_on_interrupt()?;
+        let progress = Progress::new(self.remarks, "training");
+        let budget = self.about.budget;
+        let mut seconds_per_step = 0.0;
+        while !budget.is_spent(self.trainer.steps(), self.seconds) && !stop.load(Ordering::Relaxed) {
+            let before = (self.trainer.steps(), self.seconds);
+            let stats = self.block(seconds_per_step)?;
+            let taken = self.trainer.steps() - before.0;
+            let elapsed = self.seconds - before.1;
+            seconds_per_step = elapsed / f64::from(taken.max(1));
+            self.record(&stats, elapsed, &progress)?;
+            self.measure_if_due(&progress)?;
+            if self.seconds - self.saved.1 >= BETWEEN_CHECKPOINTS {
+                self.save()?;
+            }
+        }
+        self.save()?;
+        let step = self.trainer.steps();
+        let interrupted = !budget.is_spent(step, self.seconds);
+        Ok(End { step, seconds: self.seconds, loss: self.loss, interrupted })
+    }
+
+    /// Takes up to [`BLOCK`] steps and waits for them.
+    fn block(&mut self, seconds_per_step: f64) -> Result<StepStats> {
+        let (budget, optimizer) = (self.about.budget, &self.about.config.optimizer);
+        let first = self.trainer.steps();
+        let mut count = budget.block(first, self.seconds, seconds_per_step, BLOCK);
+        if let Some(every) = self.exam.as_ref().and_then(|exam| exam.every) {
+            count = count.min(every - first % every);
+        }
+        let clock = Instant::now();
+        for step in first..first + count {
+            let seconds = self.seconds + clock.elapsed().as_secs_f64();
+            self.trainer.step(budget.learning_rate(optimizer, step, seconds), None)?;
+        }
+        let stats = self.trainer.report()?;
+        self.seconds += clock.elapsed().as_secs_f64();
+        if !(stats.loss.is_finite() && stats.color_error.is_finite()) {
+            bail!(
+                "the loss is not finite any more ({}) before step {}: the training diverged; start again with a \
+                 smaller optimizer.learning_rate; {}",
+                stats.loss,
+                self.trainer.steps(),
+                self.kept()
+            );
+        }
+        Ok(stats)
+    }
+
+    /// Logs a block and shows how far the training is.
+    fn record(&mut self, stats: &StepStats, elapsed: f64, progress: &Progress) -> Result<()> {
+        let (step, seconds, budget) = (self.trainer.steps(), self.seconds, self.about.budget);
+        let psnr = (-10.0 * stats.color_error.log10()).min(PSNR_CAP_DB);
+        self.loss = Some(stats.loss);
+        if stats.samples == 0 && !self.is_empty {
+            progress.say(&format!(
+                "warning: at step {step} the rays meet nothing any more, the field has become empty; try a smaller \
+                 optimizer.learning_rate or occupancy.threshold"
+            ));
+        }
+        self.is_empty = stats.samples == 0;
+        self.log.write(&json!({
+            "step": step,
+            "seconds": seconds,
+            "loss": stats.loss,
+            "psnr": psnr,
+            "rays": stats.rays,
+            "samples": stats.samples,
+            "marched": stats.marched,
+            "learning_rate": budget.learning_rate(&self.about.config.optimizer, step, seconds),
+        }))?;
+        let spent = budget.spent(step, seconds);
+        progress.update(spent, || {
+            let per_second = |count: u64| short(count as f64 / elapsed.max(1e-9));
+            let earlier = budget.spent(self.about.step, self.about.seconds);
+            let remaining = (seconds - self.about.seconds) * (1.0 - spent) / (spent - earlier).max(1e-9);
+            format!(
+                "step {step}, loss {:.5}, PSNR {psnr:.2} dB, {} rays/s, {} samples/s, {}, {} to go",
+                stats.loss,
+                per_second(stats.rays),
+                per_second(stats.samples),
+                duration(seconds),
+                duration(remaining)
+            )
+        });
+        Ok(())
+    }
+
+    fn measure_if_due(&mut self, progress: &Progress) -> Result<()> {
+        let step = self.trainer.steps();
+        let Some(exam) = &mut self.exam else { return Ok(()) };
+        if exam.every.is_none_or(|every| !step.is_multiple_of(every)) {
+            return Ok(());
+        }
+        let mut scores = Vec::new();
+        for (index, image) in &exam.few {
+            scores.push(exam.judge.score(*index, image)?.0);
+        }
+        let Some(Means { psnr, views, .. }) = Means::of(&scores) else { return Ok(()) };
+        progress.say(&format!("step {step}: PSNR {psnr:.2} dB over {views} test views"));
+        let row = json!({ "step": step, "seconds": self.seconds, "eval_psnr": psnr, "views": views });
+        self.log.write(&row)
+    }
+
+    fn save(&mut self) -> Result<()> {
+        let state = self.trainer.state()?;
+        let (step, rays, seconds) = (state.step, state.rays, self.seconds);
+        let about = About { step, rays, seconds, ..self.about.clone() };
+        let checkpoint = Checkpoint { about, state };
+        checkpoint.save(&self.checkpoint).with_context(|| format!("at step {step} ({})", self.kept()))?;
+        self.saved = (step, seconds);
+        Ok(())
+    }
+
+    /// What there is to go on with.
+    fn kept(&self) -> String {
+        match self.saved.0 {
+            0 => "nothing was saved yet".to_owned(),
+            step => format!("the checkpoint of step {step} is kept"),
+        }
+    }
+}
+
+/// A flag that Ctrl-C raises; pressed again, it ends the program at once.
+fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .context("listening for Ctrl-C")?;
+    Ok(stop)
+}

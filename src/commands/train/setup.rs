@@ -1,0 +1,210 @@
+//! What is trained, on what, and for how long: the command line, the dataset and an earlier training together.
+
+use crate::cli::Train;
+use crate::commands::find_frames;
+use crate::progress::{duration, short};
+use crate::remarks::Remarks;
+use anyhow::{Result, ensure};
+use nerf::camera::{Camera, Lens};
+use nerf::checkpoint::{About, Checkpoint, FORMAT, Splits};
+use nerf::config::{Background, Config};
+use nerf::dataset::Dataset;
+use nerf::gpu::Gpu;
+use nerf::kernels::training::accumulation_name;
+use nerf::kernels::{Needs, Plan};
+use nerf::model::finest_resolution;
+use nerf::orbit::Orbit;
+use nerf::schedule::Budget;
+use nerf::train::State;
+
+/// Seconds of training on a CPU when nothing is said.
+const CPU_SECONDS: f64 = 300.0;
+/// Steps on a GPU when nothing is said.
+const GPU_STEPS: u32 = 20_000;
+
+/// A training that can begin.
+#[derive(Debug)]
+pub(super) struct Setup {
+    /// What its checkpoints say, at the first step of this run.
+    pub(super) about: About,
+    /// How the kernels are linked.
+    pub(super) plan: Plan,
+    /// Where an earlier run ended.
+    pub(super) state: Option<State>,
+    /// Frames to train on.
+    pub(super) train: Vec<usize>,
+    /// Frames to measure on.
+    pub(super) test: Vec<usize>,
+    /// The cameras to train on.
+    pub(super) cameras: Vec<Camera>,
+}
+
+impl Setup {
+    /// A new training, or the one that `resumed` holds.
+    pub(super) fn new(
+        args: &Train,
+        dataset: &Dataset,
+        gpu: &Gpu,
+        resumed: Option<Checkpoint>,
+    ) -> Result<Self> {
+        ensure!(!dataset.train.is_empty(), "the dataset has no frame to train on");
+        let (mut about, state, train, test) = match resumed {
+            None => (first(args, dataset, gpu)?, None, dataset.train.clone(), dataset.test.clone()),
+            Some(Checkpoint { about, state }) => {
+                let (train, test) = same_frames(&about, dataset)?;
+                (again(args, about)?, Some(state), train, test)
+            }
+        };
+        about.dataset = args.dataset.display().to_string();
+        about.adapter.clone_from(&gpu.info.name);
+        about.budget = budget(args, gpu, state.as_ref().map(|_| about.budget));
+        about.budget.validate()?;
+        let plan = Plan::new(gpu, about.config.clone(), about.layout(), about.needs.clone());
+        let cameras = cameras(dataset, &train);
+        Ok(Self { about, plan, state, train, test, cameras })
+    }
+
+    /// Says what was chosen, and what was left out.
+    pub(super) fn describe(&self, dataset: &Dataset, gpu: &Gpu, remarks: Remarks) {
+        let About { config, budget, bounds, .. } = &self.about;
+        remarks.say(&format!("{} views to train on, {} to measure on", self.train.len(), self.test.len()));
+        remarks.detail(&format!(
+            "scene box: centre {:.4}, half side {:.4}, {} cascades; {}",
+            bounds.center, bounds.half, bounds.cascades, bounds.source
+        ));
+        let steps = budget.steps.map(|steps| format!("{steps} steps"));
+        let ends: Vec<_> = steps.into_iter().chain(budget.seconds.map(duration)).collect();
+        remarks.say(&format!(
+            "training on {}: {} grid levels from {} to {} cells, up to 2^{} entries each; networks {} wide; {} \
+             samples per step; {} for {}{}",
+            gpu.info.name,
+            config.grid.levels,
+            config.grid.base,
+            config.grid.finest,
+            config.grid.log2_table,
+            config.network.width,
+            short(config.batch.kept as f64),
+            accumulation_name(self.plan.accumulation),
+            ends.join(" or "),
+            if self.state.is_some() { format!(", from step {} on", self.about.step) } else { String::new() }
+        ));
+        remarks.say(&format!("left out: {}", self.left_out(dataset).join(", ")));
+    }
+
+    fn left_out(&self, dataset: &Dataset) -> Vec<&'static str> {
+        let needs = &self.plan.needs;
+        let parts = [
+            (!needs.lens, "lens model (all cameras are pinholes)"),
+            (needs.cascades == 1, "cascades and growing steps (the scene is bounded)"),
+            (!needs.hdr, "linear pixels (the images have 8 bits)"),
+            (self.about.config.background != Background::Random, "random backgrounds (not asked for)"),
+            (dataset.is_hdr, "8-bit pixels (the images are linear)"),
+        ];
+        parts.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, part)| part).collect()
+    }
+}
+
+fn cameras(dataset: &Dataset, indices: &[usize]) -> Vec<Camera> {
+    indices.iter().map(|&index| dataset.frames[index].camera.clone()).collect()
+}
+
+/// The settings: those of `config`, the file, single values, flags.
+fn configure(mut config: Config, args: &Train) -> Result<Config> {
+    if let Some(path) = &args.config {
+        config.merge_file(path)?;
+    }
+    for assignment in &args.set {
+        config.set(assignment)?;
+    }
+    config.seed = args.seed.unwrap_or(config.seed);
+    config.background = args.background.unwrap_or(config.background);
+    config.validate()?;
+    Ok(config)
+}
+
+fn first(args: &Train, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
+    let defaults = if gpu.is_cpu() { Config::for_cpu()? } else { Config::default() };
+    let mut config = configure(defaults, args)?;
+    let bounds = dataset.bounds.clone();
+    let cameras = cameras(dataset, &dataset.train);
+    if config.grid.finest == 0 {
+        config.grid.finest = finest_resolution(config.grid.base, &bounds, &cameras);
+    }
+    let mut used = dataset.train.iter().chain(&dataset.test);
+    let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
+    let orbit = Orbit::of(&cameras, bounds.center);
+    Ok(About {
+        format: FORMAT,
+        dataset: String::new(),
+        adapter: String::new(),
+        step: 0,
+        rays: config.batch.first_rays,
+        seconds: 0.0,
+        budget: Budget::default(),
+        needs: Needs {
+            lens: used.any(|&index| dataset.frames[index].camera.lens != Lens::Pinhole),
+            hdr: dataset.is_hdr,
+            cascades: bounds.cascades,
+            box_min: [0.0; 3],
+            box_max: [1.0; 3],
+            cameras: cameras.len(),
+        },
+        splits: Splits { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) },
+        image_size: [orbit.width, orbit.height],
+        has_alpha: dataset.is_cutout,
+        orbit,
+        config,
+        bounds,
+    })
+}
+
+/// The description of an earlier training with what the command line changes; the field's size stays.
+fn again(args: &Train, mut about: About) -> Result<About> {
+    let config = configure(about.config.clone(), args)?;
+    let changed = About { config, ..about.clone() };
+    ensure!(
+        changed.layout() == about.layout() && changed.config.occupancy.cells == about.config.occupancy.cells,
+        "a training cannot change its grid, network or occupancy grid on --resume; leave those settings out, or \
+         start anew with --overwrite"
+    );
+    about.config = changed.config;
+    Ok(about)
+}
+
+/// The frames that an earlier training used, by name.
+fn same_frames(about: &About, dataset: &Dataset) -> Result<(Vec<usize>, Vec<usize>)> {
+    let (train, missing) = find_frames(dataset, &about.splits.train);
+    ensure!(
+        missing.is_empty(),
+        "{} frames that were trained on are not in this dataset ({}, …); resume with the dataset that the \
+         training began with, {}",
+        missing.len(),
+        missing[0],
+        about.dataset
+    );
+    let orbit = Orbit::of(&cameras(dataset, &train), about.bounds.center);
+    let is_same = [orbit.width, orbit.height] == about.image_size
+        && (orbit.radius - about.orbit.radius).abs() <= 1e-6 * orbit.radius;
+    ensure!(
+        is_same,
+        "the frames of this dataset have other cameras than those trained on; resume with the dataset that the \
+         training began with, {}",
+        about.dataset
+    );
+    ensure!(
+        about.needs.hdr == dataset.is_hdr,
+        "the training began with images of another kind (8-bit or linear OpenEXR); resume with {}",
+        about.dataset
+    );
+    Ok((train, find_frames(dataset, &about.splits.test).0))
+}
+
+/// The end asked for, else that of the earlier run, else one that suits the adapter.
+fn budget(args: &Train, gpu: &Gpu, earlier: Option<Budget>) -> Budget {
+    let asked = Budget { steps: args.steps, seconds: args.seconds };
+    let suitable = match gpu.is_cpu() {
+        true => Budget { steps: None, seconds: Some(CPU_SECONDS) },
+        false => Budget { steps: Some(GPU_STEPS), seconds: None },
+    };
+    if asked == Budget::default() { earlier.unwrap_or(suitable) } else { asked }
+}

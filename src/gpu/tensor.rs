@@ -1,0 +1,269 @@
+//! Arrays that live in a storage buffer or, where that is faster, in a texture.
+//!
+//! llvmpipe reads a storage buffer lane by lane, with a bounds check each; texels it gathers. A vec4 from a
+//! texture costs a tenth of one from a buffer there, which is worth a factor of three on a whole step. GPUs
+//! read both equally fast, and buffers can be larger: there every tensor is a buffer.
+//!
+//! WGSL declares `tensor<read> name: vec4<f32>;` (or `write`, `read_write`; `vec2<f32>`, `vec2<u32>`, `u32`)
+//! and calls `name_load(index)` and `name_store(index, value)`. It is the one extension of the linker.
+
+use super::Gpu;
+use anyhow::{Result, bail};
+use bytemuck::Pod;
+
+/// Where the tensors of a kernel live.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Memory {
+    /// Storage buffers.
+    #[default]
+    Buffers,
+    /// Textures [`WIDTH`] texels wide.
+    Textures,
+}
+
+/// Texels per row.
+pub const WIDTH: usize = 1024;
+
+/// The type of an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Element {
+    /// `vec4<f32>`
+    Vec4,
+    /// `vec2<f32>`
+    Vec2,
+    /// `vec2<u32>`
+    Pair,
+    /// `u32`
+    Word,
+}
+
+impl Element {
+    const ALL: [Self; 4] = [Self::Vec4, Self::Vec2, Self::Pair, Self::Word];
+
+    /// The WGSL type.
+    #[must_use]
+    pub fn wgsl(self) -> &'static str {
+        match self {
+            Self::Vec4 => "vec4<f32>",
+            Self::Vec2 => "vec2<f32>",
+            Self::Pair => "vec2<u32>",
+            Self::Word => "u32",
+        }
+    }
+
+    /// Bytes per element.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::Vec4 => 16,
+            Self::Vec2 | Self::Pair => 8,
+            Self::Word => 4,
+        }
+    }
+
+    /// The texture format that holds it.
+    #[must_use]
+    pub fn format(self) -> wgpu::TextureFormat {
+        match self {
+            Self::Vec4 => wgpu::TextureFormat::Rgba32Float,
+            Self::Vec2 => wgpu::TextureFormat::Rg32Float,
+            Self::Pair => wgpu::TextureFormat::Rg32Uint,
+            Self::Word => wgpu::TextureFormat::R32Uint,
+        }
+    }
+
+    /// Format name, sampled type, components and the value widened to four components.
+    fn texel(self) -> (&'static str, &'static str, &'static str, &'static str) {
+        match self {
+            Self::Vec4 => ("rgba32float", "f32", "", "value"),
+            Self::Vec2 => ("rg32float", "f32", ".xy", "vec4(value, 0.0, 0.0)"),
+            Self::Pair => ("rg32uint", "u32", ".xy", "vec4(value, 0u, 0u)"),
+            Self::Word => ("r32uint", "u32", ".x", "vec4(value, 0u, 0u, 0u)"),
+        }
+    }
+}
+
+/// Expands one declaration; `None` when `line` is none. The expansion is one line, so that positions in error
+/// messages stay true.
+#[must_use]
+pub fn expand(line: &str, memory: Memory) -> Option<String> {
+    let (access, rest) = line.strip_prefix("tensor<")?.split_once("> ")?;
+    let (name, kind) = rest.trim_end().strip_suffix(';')?.split_once(": ")?;
+    let element = Element::ALL.into_iter().find(|element| element.wgsl() == kind)?;
+    let (format, sampled, components, widened) = element.texel();
+    let at = format!("vec2<u32>(index % {WIDTH}u, index / {WIDTH}u)");
+    let (variable, load, store) = match (memory, access) {
+        (Memory::Buffers, _) => {
+            let access = if access == "read" { "read" } else { "read_write" };
+            let variable = format!("var<storage, {access}> {name}: array<{kind}>;");
+            (variable, format!("{name}[index]"), format!("{name}[index] = value;"))
+        }
+        (Memory::Textures, "read") => {
+            let load = format!("textureLoad({name}, {at}, 0){components}");
+            (format!("var {name}: texture_2d<{sampled}>;"), load, String::new())
+        }
+        (Memory::Textures, access) => {
+            let variable = format!("var {name}: texture_storage_2d<{format}, {access}>;");
+            let load = format!("textureLoad({name}, {at}){components}");
+            (variable, load, format!("textureStore({name}, {at}, {widened});"))
+        }
+    };
+    let mut text = variable;
+    if access != "write" {
+        text += &format!(" fn {name}_load(index: u32) -> {kind} {{ return {load}; }}");
+    }
+    if access != "read" {
+        text += &format!(" fn {name}_store(index: u32, value: {kind}) {{ {store} }}");
+    }
+    Some(text)
+}
+
+/// An array on the device.
+#[derive(Clone, Debug)]
+pub struct Tensor {
+    /// The name of the WGSL declaration it stands for.
+    pub name: &'static str,
+    /// The type of its elements.
+    pub element: Element,
+    /// Number of elements.
+    pub count: usize,
+    /// Where they live.
+    pub place: Place,
+}
+
+/// Where a tensor lives.
+#[derive(Clone, Debug)]
+pub enum Place {
+    /// A storage buffer.
+    Buffer(wgpu::Buffer),
+    /// A texture and its only view.
+    Texture(wgpu::Texture, wgpu::TextureView),
+}
+
+impl Tensor {
+    /// Bytes on the device.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        (self.count * self.element.bytes()) as u64
+    }
+
+    /// The commands that set it to zero.
+    pub fn clear(&self, encoder: &mut wgpu::CommandEncoder) {
+        match &self.place {
+            Place::Buffer(buffer) => encoder.clear_buffer(buffer, 0, None),
+            Place::Texture(texture, _) => {
+                encoder.clear_texture(texture, &wgpu::ImageSubresourceRange::default())
+            }
+        }
+    }
+}
+
+impl Gpu {
+    /// The memory that suits this adapter.
+    #[must_use]
+    pub fn fast_memory(&self) -> Memory {
+        let features =
+            wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES | wgpu::Features::CLEAR_TEXTURE;
+        if self.is_cpu() && self.has(features) { Memory::Textures } else { Memory::Buffers }
+    }
+
+    /// A zeroed tensor.
+    ///
+    /// # Errors
+    /// When it is larger than the adapter can bind; the message tells both sizes.
+    pub fn tensor(
+        &self,
+        name: &'static str,
+        element: Element,
+        count: usize,
+        memory: Memory,
+    ) -> Result<Tensor> {
+        let place = match memory {
+            Memory::Buffers => Place::Buffer(self.storage::<u8>(name, count * element.bytes())?.raw),
+            Memory::Textures => self.texture(name, element, count)?,
+        };
+        Ok(Tensor { name, element, count, place })
+    }
+
+    fn texture(&self, name: &'static str, element: Element, count: usize) -> Result<Place> {
+        let rows = count.div_ceil(WIDTH).max(1);
+        let most = self.device.limits().max_texture_dimension_2d as usize;
+        if rows > most {
+            bail!(
+                "the tensor '{name}' needs {rows} rows of {WIDTH} texels, and the adapter '{}' has textures of at \
+                 most {most} rows; use a smaller grid (`--set grid.log2_table=…`) or batch (`--set batch.samples=…`)",
+                self.info.name
+            );
+        }
+        use wgpu::TextureUsages as Usage;
+        let texture = self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(name),
+            size: wgpu::Extent3d { width: WIDTH as u32, height: rows as u32, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: element.format(),
+            usage: Usage::TEXTURE_BINDING | Usage::STORAGE_BINDING | Usage::COPY_SRC | Usage::COPY_DST,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Ok(Place::Texture(texture, view))
+    }
+
+    /// Writes `data` at the tensor's start, before the next submission.
+    pub fn write_tensor<T: Pod>(&self, tensor: &Tensor, data: &[T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        match &tensor.place {
+            Place::Buffer(buffer) => self.queue.write_buffer(buffer, 0, bytes),
+            Place::Texture(texture, _) => {
+                let row = WIDTH * tensor.element.bytes();
+                let mut padded = bytes.to_vec();
+                padded.resize(bytes.len().next_multiple_of(row), 0);
+                let height = padded.len() / row;
+                if height > 0 {
+                    self.queue.write_texture(
+                        texture.as_image_copy(),
+                        &padded,
+                        row_layout(tensor.element),
+                        wgpu::Extent3d {
+                            width: WIDTH as u32,
+                            height: height as u32,
+                            depth_or_array_layers: 1,
+                        },
+                    );
+                }
+            }
+        }
+    }
+
+    /// Reads the first `count` values of type `T`, waiting for the device.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn read_tensor<T: Pod>(&self, tensor: &Tensor, count: usize) -> Result<Vec<T>> {
+        let bytes = count * size_of::<T>();
+        let (Place::Texture(texture, _), 1..) = (&tensor.place, count) else {
+            let Place::Buffer(buffer) = &tensor.place else { return Ok(Vec::new()) };
+            return self.read(&super::buffer::Buffer { name: tensor.name, raw: buffer.clone() }, 0, count);
+        };
+        let row = WIDTH * tensor.element.bytes();
+        let rows = bytes.div_ceil(row);
+        let staging = self.storage::<u8>("read back", rows * row)?;
+        let mut encoder = self.encoder("read back");
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo { buffer: &staging.raw, layout: row_layout(tensor.element) },
+            wgpu::Extent3d { width: WIDTH as u32, height: rows as u32, depth_or_array_layers: 1 },
+        );
+        self.submit(encoder);
+        self.read(&staging, 0, count)
+    }
+}
+
+fn row_layout(element: Element) -> wgpu::TexelCopyBufferLayout {
+    wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some((WIDTH * element.bytes()) as u32),
+        rows_per_image: None,
+    }
+}

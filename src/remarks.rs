@@ -1,0 +1,50 @@
+//! Remarks on stderr.
+
+use crate::cli::Global;
+use nerf::dataset::{Dataset, Severity};
+use std::io::Write;
+
+/// Prints remarks as far as they are wanted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Remarks {
+    /// Nothing at all.
+    pub(crate) quiet: bool,
+    verbose: bool,
+}
+
+impl Remarks {
+    /// What the command line asks for.
+    pub(crate) fn new(global: &Global) -> Self {
+        Self { quiet: global.quiet, verbose: global.verbose > 0 }
+    }
+
+    /// A line that everybody should see.
+    pub(crate) fn say(self, line: &str) {
+        if !self.quiet {
+            // Nobody may be listening.
+            let _ = writeln!(std::io::stderr(), "{line}");
+        }
+    }
+
+    /// Something that probably makes results worse.
+    pub(crate) fn warn(self, line: &str) {
+        self.say(&format!("warning: {line}"));
+    }
+
+    /// A line for `--verbose`.
+    pub(crate) fn detail(self, line: &str) {
+        if self.verbose {
+            self.say(line);
+        }
+    }
+
+    /// What was assumed or looks wrong in a dataset.
+    pub(crate) fn notes(self, dataset: &Dataset) {
+        for note in &dataset.notes {
+            match note.severity {
+                Severity::Note => self.say(&format!("note: {note}")),
+                Severity::Warning => self.warn(&note.message),
+            }
+        }
+    }
+}
