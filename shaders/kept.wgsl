@@ -24,7 +24,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let choice = chosen_load(first + i);
         kept_rows_store(span.x + i, vec2(choice.x, index));
         let log_density = density_log(density_out_load(choice.x * DENSITY_QUADS).x);
-        let delta = samples_load(choice.x).w;
-        kept_steps_store(span.x + i, vec4(log_density, delta, bitcast<f32>(choice.y), 0.0));
+        let delta = samples_load(choice.x).w * bitcast<f32>(choice.y);
+        kept_steps_store(span.x + i, vec4(log_density, delta, 0.0, 0.0));
     }
 }

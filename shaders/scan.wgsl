@@ -43,6 +43,8 @@ fn main(@builtin(local_invocation_index) thread: u32) {
         }
         first += count;
     }
+    // The spans that other threads wrote are read below.
+    storageBarrier();
     workgroupBarrier();
     if thread == 0u {
         let used = atomicLoad(&first_dropped);

@@ -15,16 +15,19 @@ pub mod density;
 pub mod layer;
 pub mod marching;
 pub mod occupancy;
+mod shared;
 pub mod training;
 pub mod viewing;
+mod workspace;
+
+pub use shared::{Camera, Counters, Step};
+pub use workspace::Workspace;
 
 use crate::config::{Accumulation, Background, Config, Transmittance};
 use crate::gpu::Gpu;
-use crate::gpu::buffer::Buffer;
-use crate::gpu::kernel::{Bound, Kernel, Resource, Shared};
+use crate::gpu::kernel::{Kernel, Shared};
 use crate::gpu::source::Source;
-use crate::gpu::tensor::{Element, Memory, Tensor};
-use crate::gpu_struct;
+use crate::gpu::tensor::{Element, Memory};
 use crate::model::{DENSITY_OUTPUTS, Layout, Level};
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
@@ -66,90 +69,6 @@ pub mod dispatch {
     pub const COUNT: usize = 5;
 }
 
-gpu_struct! {
-    /// The numbers that change from step to step.
-    Step {
-        /// Start of this step's random numbers.
-        stream: u32,
-        /// First pixel of a chunk of a view.
-        first_pixel: u32,
-        /// First cell of an occupancy chunk.
-        first_cell: u32,
-        /// Distance between its cells.
-        cell_stride: u32,
-        /// Number of its cells.
-        cell_count: u32,
-        /// Adam's learning rate.
-        learning_rate: f32,
-        /// 1 / (1 - beta_1^t).
-        first_correction: f32,
-        /// 1 / (1 - beta_2^t).
-        second_correction: f32,
-    }
-}
-
-gpu_struct! {
-    /// What is counted on the device; see `shaders/common/counters.wgsl`.
-    Counters {
-        /// Rays of the next step.
-        rays: u32,
-        /// Rays whose samples fit.
-        rays_used: u32,
-        /// Marched samples.
-        samples: u32,
-        /// Marched samples all rays asked for.
-        samples_wanted: u32,
-        /// Kept samples.
-        kept: u32,
-        /// Kept samples all rays asked for.
-        kept_wanted: u32,
-        /// Steps since the sums were cleared.
-        sum_steps: u32,
-        /// Rays since then.
-        sum_rays: u32,
-        /// Marched samples since then.
-        sum_samples: u32,
-        /// Kept samples since then.
-        sum_kept: u32,
-        /// Sum of the steps' losses.
-        sum_loss: f32,
-        /// Sum of the steps' mean squared colour errors.
-        sum_color_error: f32,
-    }
-}
-
-gpu_struct! {
-    /// A camera in box space; see `shaders/common/camera.wgsl`.
-    Camera {
-        /// Position.
-        origin: [f32; 3],
-        /// Pixels per row.
-        width: u32,
-        /// +X axis.
-        right: [f32; 3],
-        /// Rows.
-        height: u32,
-        /// +Y axis.
-        up: [f32; 3],
-        /// Index of the image's first pixel.
-        first_texel: u32,
-        /// +Z axis, away from the view.
-        back: [f32; 3],
-        /// Padding.
-        unused: u32,
-        /// Focal lengths.
-        focal_px: [f32; 2],
-        /// Principal point.
-        center_px: [f32; 2],
-        /// k1..k4.
-        radial: [f32; 4],
-        /// p1, p2.
-        tangential: [f32; 2],
-        /// Padding.
-        unused_2: [f32; 2],
-    }
-}
-
 /// What a scene needs, apart from the configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Needs {
@@ -185,7 +104,7 @@ pub struct Plan {
 }
 
 /// Chunks of samples whose weight gradients are summed apart.
-pub const CHUNKS: usize = 64;
+pub const CHUNKS: usize = 32;
 
 impl Plan {
     /// Chooses what depends on the adapter.
@@ -198,7 +117,11 @@ impl Plan {
             chosen => chosen,
         };
         let shared_weights = gpu.is_cpu() && gpu.has_subgroups_of(8);
-        let rows = std::env::var("SPT").ok().and_then(|s| s.parse().ok()).unwrap_or(8);
+        let rows = match (gpu.is_cpu(), shared_weights) {
+            (true, true) => 8,
+            (true, false) => 4,
+            (false, _) => 2,
+        };
         let product = layer::Product { rows, shared_weights };
         Self { config, layout, needs, product, accumulation, memory: gpu.fast_memory() }
     }
@@ -394,142 +317,4 @@ impl Plan {
 fn vec3(value: [f32; 3]) -> impl Display {
     let [x, y, z] = value;
     format!("vec3<f32>({x:?}, {y:?}, {z:?})")
-}
-
-/// Buffers and tensors by name: what kernels are bound to.
-#[derive(Clone, Debug, Default)]
-pub struct Workspace {
-    buffers: Vec<Buffer>,
-    tensors: Vec<Tensor>,
-}
-
-impl Workspace {
-    /// Adds a buffer; its name must be new.
-    pub fn add(&mut self, buffer: Buffer) {
-        debug_assert!(
-            self.buffers.iter().all(|b| b.name != buffer.name),
-            "two buffers named {}",
-            buffer.name
-        );
-        self.buffers.push(buffer);
-    }
-
-    /// Adds a tensor; its name must be new.
-    pub fn add_tensor(&mut self, tensor: Tensor) {
-        debug_assert!(
-            self.tensors.iter().all(|t| t.name != tensor.name),
-            "two tensors named {}",
-            tensor.name
-        );
-        self.tensors.push(tensor);
-    }
-
-    /// The buffer `name`.
-    ///
-    /// # Panics
-    /// When there is none: names are fixed in this module and its children.
-    #[must_use]
-    pub fn get(&self, name: &str) -> &Buffer {
-        let found = self.buffers.iter().find(|buffer| buffer.name == name);
-        found.unwrap_or_else(|| unreachable!("no buffer named '{name}'"))
-    }
-
-    /// The tensor `name`.
-    ///
-    /// # Panics
-    /// When there is none: names are fixed in this module and its children.
-    #[must_use]
-    pub fn tensor(&self, name: &str) -> &Tensor {
-        let found = self.tensors.iter().find(|tensor| tensor.name == name);
-        found.unwrap_or_else(|| unreachable!("no tensor named '{name}'"))
-    }
-
-    /// Reads the first `count` values of a buffer or tensor, waiting for the device.
-    ///
-    /// # Errors
-    /// When the device was lost.
-    pub fn read<T: bytemuck::Pod>(&self, gpu: &Gpu, name: &str, count: usize) -> Result<Vec<T>> {
-        match self.tensors.iter().find(|tensor| tensor.name == name) {
-            Some(tensor) => gpu.read_tensor(tensor, count),
-            None => gpu.read(self.get(name), 0, count),
-        }
-    }
-
-    /// Writes `data` at the start of a buffer or tensor, before the next submission.
-    pub fn write<T: bytemuck::Pod>(&self, gpu: &Gpu, name: &str, data: &[T]) {
-        match self.tensors.iter().find(|tensor| tensor.name == name) {
-            Some(tensor) => gpu.write_tensor(tensor, data),
-            None => gpu.write(self.get(name), 0, data),
-        }
-    }
-
-    /// Shares a buffer or a tensor of `other`.
-    pub fn share(&mut self, other: &Self, name: &str) {
-        self.buffers.extend(other.buffers.iter().find(|buffer| buffer.name == name).cloned());
-        self.tensors.extend(other.tensors.iter().find(|tensor| tensor.name == name).cloned());
-    }
-
-    /// Binds `kernel` to what it uses; `renamed` pairs a WGSL name with the name here.
-    ///
-    /// # Errors
-    /// When one is missing.
-    pub fn bind(&self, gpu: &Gpu, kernel: &Kernel, renamed: &[(&str, &str)]) -> Result<Bound> {
-        self.bind_with(gpu, kernel, renamed, &[])
-    }
-
-    /// As [`Workspace::bind`], with further resources.
-    ///
-    /// # Errors
-    /// When one is missing.
-    pub fn bind_with(
-        &self,
-        gpu: &Gpu,
-        kernel: &Kernel,
-        renamed: &[(&str, &str)],
-        further: &[Resource<'_>],
-    ) -> Result<Bound> {
-        let mut resources = further.to_vec();
-        for (name, here) in renamed {
-            resources.extend(self.buffers.iter().find(|b| b.name == *here).map(|b| b.named(name)));
-            resources.extend(self.tensors.iter().find(|t| t.name == *here).map(|t| t.named(name)));
-        }
-        resources.extend(self.buffers.iter().map(Buffer::resource));
-        resources.extend(self.tensors.iter().map(|tensor| tensor.named(tensor.name)));
-        kernel.bind(gpu, &resources)
-    }
-
-    /// Bytes of everything in it.
-    #[must_use]
-    pub fn bytes(&self) -> u64 {
-        let buffers: u64 = self.buffers.iter().map(|buffer| buffer.raw.size()).sum();
-        buffers + self.tensors.iter().map(Tensor::bytes).sum::<u64>()
-    }
-}
-
-impl Camera {
-    /// `camera` in the space where the scene's box is the unit cube; its pixels start at `first_texel`.
-    #[must_use]
-    pub fn in_box(camera: &crate::camera::Camera, bounds: &crate::dataset::Bounds, first_texel: u32) -> Self {
-        let pose = camera.world_from_camera;
-        let side = 2.0 * bounds.outer_half();
-        let axis = |axis: glam::DVec3| axis.normalize_or_zero().as_vec3().to_array();
-        let (radial, tangential) = match camera.lens {
-            crate::camera::Lens::Pinhole => ([0.0; 4], [0.0; 2]),
-            crate::camera::Lens::OpenCv { k, p } => (k, p),
-        };
-        Self {
-            origin: ((pose.translation - bounds.min()) / side).as_vec3().to_array(),
-            width: camera.width,
-            right: axis(pose.matrix3.x_axis),
-            height: camera.height,
-            up: axis(pose.matrix3.y_axis),
-            first_texel,
-            back: axis(pose.matrix3.z_axis),
-            focal_px: camera.focal_px.as_vec2().to_array(),
-            center_px: camera.center_px.as_vec2().to_array(),
-            radial: radial.map(|k| k as f32),
-            tangential: tangential.map(|p| p as f32),
-            ..Self::default()
-        }
-    }
 }

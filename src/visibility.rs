@@ -32,6 +32,7 @@ enum Sight {
 pub fn hidden_cells(cameras: &[Camera], images: &[Image], bounds: &Bounds, cells: u32) -> Vec<bool> {
     let views: Vec<View<'_>> =
         cameras.iter().zip(images).map(|(camera, image)| View::new(camera, image)).collect();
+    let carves = views.iter().any(|view| !view.opaque_sums.is_empty());
     let per_cascade = cells.pow(3);
     (0..per_cascade * bounds.cascades)
         .into_par_iter()
@@ -44,18 +45,19 @@ pub fn hidden_cells(cameras: &[Camera], images: &[Image], bounds: &Bounds, cells
                 f64::from(within / (cells * cells)),
             );
             let center = bounds.center + (corner + 0.5 - f64::from(cells) / 2.0) * side;
-            is_hidden(&views, center, side)
+            is_hidden(&views, carves, center, side)
         })
         .collect()
 }
 
-fn is_hidden(views: &[View<'_>], center: DVec3, side: f64) -> bool {
+fn is_hidden(views: &[View<'_>], carves: bool, center: DVec3, side: f64) -> bool {
     let radius = side * 3f64.sqrt() / 2.0;
     let mut seen = false;
     let mut empty = 0;
     for view in views {
         match view.sight(center, radius) {
             Sight::Unseen => {}
+            Sight::Seen if !carves => return false,
             Sight::Seen => seen = true,
             Sight::Empty => {
                 empty += 1;
@@ -70,6 +72,9 @@ fn is_hidden(views: &[View<'_>], center: DVec3, side: f64) -> bool {
 
 struct View<'a> {
     camera: &'a Camera,
+    /// Largest angle of a pixel's ray to the view axis, in radians: what lies outside this cone need not be
+    /// projected.
+    half_angle: f64,
     /// Number of pixels with any alpha in the rectangle from the corner to here, `(width + 1) × (height + 1)`;
     /// empty for an opaque image.
     opaque_sums: Vec<u32>,
@@ -78,14 +83,19 @@ struct View<'a> {
 impl<'a> View<'a> {
     fn new(camera: &'a Camera, image: &Image) -> Self {
         let opaque_sums = if image.has_alpha { opaque_sums(image) } else { Vec::new() };
-        Self { camera, opaque_sums }
+        Self { camera, half_angle: half_angle(camera), opaque_sums }
     }
 
     /// What this view says of a ball.
     fn sight(&self, center: DVec3, radius: f64) -> Sight {
         let camera = self.camera;
-        if center.distance(camera.position()) < radius {
+        let toward = center - camera.position();
+        let distance = toward.length();
+        if distance < radius {
             return Sight::Seen;
+        }
+        if toward.angle_between(camera.forward()) > self.half_angle + (radius / distance).asin() {
+            return Sight::Unseen;
         }
         let Some((pixel, depth)) = camera.project(center) else { return Sight::Unseen };
         if depth <= 0.0 {
@@ -110,6 +120,20 @@ impl<'a> View<'a> {
         let (low, high) = (low.floor(), high.ceil());
         (at(high.x, high.y) + at(low.x, low.y)) - at(low.x, high.y) - at(high.x, low.y)
     }
+}
+
+/// The corners and the middles of the sides are farthest from the axis.
+fn half_angle(camera: &Camera) -> f64 {
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let forward = camera.forward();
+    let rim =
+        [0.0, 0.5, 1.0].into_iter().flat_map(|x| [0.0, 0.5, 1.0].map(|y| DVec2::new(x * width, y * height)));
+    let margin = MARGIN_PX / camera.focal_px.min_element();
+    let angle = |pixel| camera.ray(pixel).map(|ray| ray.direction.angle_between(forward));
+    // A lens without a ray there sees the whole half space.
+    rim.map(angle)
+        .try_fold(0.0, |most: f64, angle| angle.map(|angle| most.max(angle)))
+        .map_or(std::f64::consts::FRAC_PI_2, |most| most + margin)
 }
 
 fn opaque_sums(image: &Image) -> Vec<u32> {

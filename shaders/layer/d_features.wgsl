@@ -4,14 +4,13 @@
 tensor<read> d_color: vec4<f32>;
 tensor<read> density_out: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
-tensor<read> kept_steps: vec4<f32>;
 tensor<write> d_input: vec4<f32>;
 
 fn layer_d_store(row: u32, quad: u32, sum: vec4<f32>) {
     var gradient = sum;
     if quad == 0u {
         let raw = density_out_load(kept_rows_load(row).x * DENSITY_QUADS).x;
-        gradient.x += density_log_backward(raw, d_color_load(row).w * kept_steps_load(row).z);
+        gradient.x += density_log_backward(raw, d_color_load(row).w);
     }
     d_input_store(row * (DENSITY_QUADS) + quad, gradient);
 }

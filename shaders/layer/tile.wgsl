@@ -1,18 +1,13 @@
 // Provides: what a tile of a weight gradient reads and writes. Needs: count_kept.
 
 struct Tile {
-    // Quads per row of the inputs and of the gradients.
+    // Quads per row of the inputs.
     input_quads: u32,
-    output_quads: u32,
-    // Tiles along both.
-    input_tiles: u32,
-    output_tiles: u32,
     // First quad of the layer in the weight buffer.
     first_quad: u32,
     // 1 when the inputs lie in the order of all marched samples.
     of_samples: u32,
-    unused_1: u32,
-    unused_2: u32,
+    unused: u32,
 }
 
 var<uniform> tile: Tile;

@@ -7,9 +7,6 @@
 
 use std::fmt::Write;
 
-/// Inputs and quads of outputs in one tile of a weight gradient.
-pub const TILE_INPUTS: usize = 16;
-
 /// Writes into a String, which cannot fail.
 macro_rules! line {
     ($text:ident, $($format:tt)*) => {{
@@ -129,38 +126,96 @@ impl Product {
     }
 }
 
-/// One tile of `Σ_rows x[k] d[o]`: [`TILE_INPUTS`] inputs by `quads` quads of outputs, over one chunk of rows.
-/// The sizes of the layer are in the uniform `tile`, so that one pipeline serves all layers.
-#[must_use]
-pub fn weight_gradient(quads: usize) -> String {
-    let mut text = String::from(TILE_HEAD);
-    for input in 0..TILE_INPUTS {
-        for quad in 0..quads {
-            line!(text, "    var sum{input}_{quad} = vec4(0.0);");
+/// Inputs that one thread of a weight gradient covers.
+const TILE_INPUTS: usize = 16;
+/// Quads of outputs that it covers at most.
+const TILE_OUTPUT_QUADS: usize = 4;
+/// The same where threads share what they read.
+const SHARED_INPUTS: usize = 4 * SHARED;
+
+impl Product {
+    /// `Σ_rows x[k] d[o]` over one chunk of rows, for a tile of inputs by `quads` quads of outputs. The sizes of
+    /// the layer are in the uniform `tile`, so that one pipeline serves all layers of as many outputs.
+    #[must_use]
+    pub fn weight_gradient(self, quads: usize) -> String {
+        if self.shared_weights { shared_weight_gradient(quads) } else { own_weight_gradient(quads) }
+    }
+
+    /// Workgroups of a weight gradient over `chunks` chunks of rows.
+    #[must_use]
+    pub fn weight_gradient_groups(self, inputs: usize, quads: usize, chunks: usize) -> usize {
+        if self.shared_weights {
+            inputs.div_ceil(SHARED_INPUTS) * chunks
+        } else {
+            let tiles = (inputs / TILE_INPUTS) * (quads / quads.min(TILE_OUTPUT_QUADS));
+            (tiles * chunks).div_ceil(8)
         }
     }
+}
+
+/// Each thread sums the gradients of four inputs: it reads their quad, and shares the outputs' gradients.
+fn shared_weight_gradient(quads: usize) -> String {
+    let mut text = String::from(SHARED_TILE_HEAD);
+    sums(&mut text, 4, quads);
+    text.push_str("    for (var row = begin; row < end; row++) {\n");
+    line!(text, "        let x = layer_input_load(tile_row(row) * tile.input_quads + input);");
+    for quad in 0..quads {
+        if quad % SHARED == 0 {
+            let most = (quads - 1 - quad).min(SHARED - 1);
+            let at = format!("row * {quads}u + {quad}u + min(lane, {most}u)");
+            line!(text, "        let shared{} = d_output_load({at});", quad / SHARED);
+        }
+        line!(text, "        let d{quad} = subgroupBroadcast(shared{}, {}u);", quad / SHARED, quad % SHARED);
+        for (input, component) in COMPONENTS.iter().enumerate() {
+            line!(text, "        sum{input}_{quad} += d{quad} * x.{component};");
+        }
+    }
+    text.push_str("    }\n    if first + lane >= tile.input_quads {\n        return;\n    }\n");
+    store_sums(&mut text, 4, quads);
+    text
+}
+
+/// Each thread sums a whole tile on its own.
+fn own_weight_gradient(quads: usize) -> String {
+    let tile = quads.min(TILE_OUTPUT_QUADS);
+    let tiles = quads / tile;
+    let mut text =
+        TILE_HEAD.replace("OUTPUT_TILES", &format!("{tiles}u")).replace("OUTPUT_QUADS", &format!("{tile}u"));
+    sums(&mut text, TILE_INPUTS, tile);
     text.push_str("    for (var row = begin; row < end; row++) {\n        let source = tile_row(row);\n");
     for quad in 0..TILE_INPUTS / 4 {
         line!(text, "        let x{quad} = layer_input_load(source * tile.input_quads + input + {quad}u);");
     }
-    for quad in 0..quads {
-        line!(text, "        let d{quad} = d_output_load(row * tile.output_quads + output + {quad}u);");
+    for quad in 0..tile {
+        line!(text, "        let d{quad} = d_output_load(row * {quads}u + output + {quad}u);");
     }
     for input in 0..TILE_INPUTS {
-        for quad in 0..quads {
+        for quad in 0..tile {
             let component = COMPONENTS[input % 4];
             line!(text, "        sum{input}_{quad} += d{quad} * x{}.{component};", input / 4);
         }
     }
     text.push_str("    }\n");
+    store_sums(&mut text, TILE_INPUTS, tile);
+    text
+}
+
+fn sums(text: &mut String, inputs: usize, quads: usize) {
+    for input in 0..inputs {
+        for quad in 0..quads {
+            line!(text, "    var sum{input}_{quad} = vec4(0.0);");
+        }
+    }
+}
+
+fn store_sums(text: &mut String, inputs: usize, quads: usize) {
     for quad in 0..quads {
-        line!(text, "    let at{quad} = base + (output + {quad}u) * tile.input_quads * 4u + input * 4u;");
-        for input in 0..TILE_INPUTS {
+        line!(text, "    let at{quad} = base + ((output + {quad}u) * tile.input_quads + input) * 4u;");
+        for input in 0..inputs {
             line!(text, "    d_weight_chunks_store(at{quad} + {input}u, sum{input}_{quad});");
         }
     }
     text.push_str("}\n");
-    text
 }
 
 const COMPONENTS: [&str; 4] = ["x", "y", "z", "w"];
@@ -170,11 +225,28 @@ const TILE_HEAD: &str = "\
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let chunk = id.x % CHUNKS;
     let number = id.x / CHUNKS;
-    if number >= tile.input_tiles * tile.output_tiles {
+    let output = number % OUTPUT_TILES * OUTPUT_QUADS;
+    let input = number / OUTPUT_TILES * 4u;
+    if input >= tile.input_quads {
         return;
     }
-    let input = (number % tile.input_tiles) * TILE_INPUT_QUADS;
-    let output = (number / tile.input_tiles) * TILE_OUTPUT_QUADS;
+    let share = (layer_count() + CHUNKS - 1u) / CHUNKS;
+    let begin = min(chunk * share, layer_count());
+    let end = min(begin + share, layer_count());
+    let base = chunk * MLP_QUADS + tile.first_quad;
+";
+
+const SHARED_TILE_HEAD: &str = "\
+@compute @workgroup_size(8)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(subgroup_invocation_id) invocation: u32,
+) {
+    let lane = invocation % 8u;
+    let chunk = group.x % CHUNKS;
+    let output = 0u;
+    let first = group.x / CHUNKS * 8u;
+    let input = min(first + lane, tile.input_quads - 1u);
     let share = (layer_count() + CHUNKS - 1u) / CHUNKS;
     let begin = min(chunk * share, layer_count());
     let end = min(begin + share, layer_count());

@@ -5,10 +5,11 @@ use super::density::{layer_stage, quads};
 use super::marching::{SPARE_ROWS, kept_capacity};
 use super::{
     ADAM, CAMERA, CHUNKS, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_STORE, STEP,
-    Workspace, dispatch, layer,
+    Workspace, dispatch,
 };
 use crate::config::Accumulation;
 use crate::gpu::Gpu;
+use crate::gpu::kernel::Kernel;
 use crate::gpu::pass::{Size, Stage};
 use crate::gpu::tensor::{Element, Memory};
 use crate::gpu_struct;
@@ -20,20 +21,12 @@ gpu_struct! {
     Tile {
         /// Quads per row of inputs.
         input_quads: u32,
-        /// Quads per row of gradients.
-        output_quads: u32,
-        /// Tiles along the inputs.
-        input_tiles: u32,
-        /// Tiles along the outputs.
-        output_tiles: u32,
         /// First quad in the weight buffer.
         first_quad: u32,
         /// 1 when the inputs lie in the order of all marched samples.
         of_samples: u32,
         /// Padding.
-        unused_1: u32,
-        /// Padding.
-        unused_2: u32,
+        unused: u32,
     }
 }
 
@@ -163,13 +156,6 @@ fn backward_layer(
 /// # Errors
 /// When a kernel cannot be built.
 pub fn weight_gradients(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
-    let tile_kernel = |quads: usize| {
-        let numbers = [("TILE_INPUT_QUADS", layer::TILE_INPUTS / 4), ("TILE_OUTPUT_QUADS", quads)];
-        let parts = [COUNTERS, COUNT_KEPT, part!("layer/tile.wgsl")];
-        let label = format!("d weights {quads}");
-        plan.generated_kernel(gpu, &label, &parts, &numbers, layer::weight_gradient(quads))
-    };
-    let (wide, narrow) = (tile_kernel(4)?, tile_kernel(1)?);
     let mut jobs = vec![
         (&plan.layout.density[0], "encoding", "d_density_hidden", true),
         (&plan.layout.density[1], "density_hidden", "d_density_out", true),
@@ -180,26 +166,34 @@ pub fn weight_gradients(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result
         let d_output = if number == last { "d_raw_color" } else { D_COLOR_HIDDEN[number] };
         jobs.push((shape, input, d_output, false));
     }
-    jobs.into_iter()
-        .map(|(shape, input, d_output, of_samples)| {
-            let quads = if shape.outputs == 4 { 1 } else { 4 };
-            let kernel = if quads == 1 { &narrow } else { &wide };
+    let mut kernels: Vec<(usize, Kernel)> = Vec::new();
+    let mut stages = Vec::new();
+    for (shape, input, d_output, of_samples) in jobs {
+        if kernels.iter().all(|(outputs, _)| *outputs != shape.outputs) {
+            kernels.push((shape.outputs, weight_kernel(gpu, plan, shape.outputs)?));
+        }
+        for (_, kernel) in kernels.iter().filter(|(outputs, _)| *outputs == shape.outputs) {
             let tile = Tile {
                 input_quads: (shape.inputs / 4) as u32,
-                output_quads: (shape.outputs / 4) as u32,
-                input_tiles: (shape.inputs / layer::TILE_INPUTS) as u32,
-                output_tiles: (shape.outputs / 4 / quads) as u32,
                 first_quad: shape.first_quad as u32,
                 of_samples: u32::from(of_samples),
-                ..Tile::default()
+                unused: 0,
             };
             let uniform = gpu.uniform("tile", &tile)?;
             let renamed = [("layer_input", input), ("d_output", d_output)];
             let bound = workspace.bind_with(gpu, kernel, &renamed, &[uniform.resource()])?;
-            let threads = (tile.input_tiles * tile.output_tiles) as usize * CHUNKS;
-            Ok(Stage::fixed(bound, threads.div_ceil(8), 1))
-        })
-        .collect()
+            let groups = plan.product.weight_gradient_groups(shape.inputs, shape.outputs / 4, CHUNKS);
+            stages.push(Stage::fixed(bound, groups, 1));
+        }
+    }
+    Ok(stages)
+}
+
+/// The kernel for the weights of layers of `outputs` outputs.
+fn weight_kernel(gpu: &Gpu, plan: &Plan, outputs: usize) -> Result<Kernel> {
+    let parts = [COUNTERS, COUNT_KEPT, part!("layer/tile.wgsl")];
+    let text = plan.product.weight_gradient(outputs / 4);
+    plan.generated_kernel(gpu, &format!("d weights {outputs}"), &parts, &[], text)
 }
 
 /// Scatters into the table, updates all parameters and ends the step.

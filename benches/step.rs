@@ -1,0 +1,409 @@
+//! Speed of the whole training step: rays, marching, density, selection, colour, the fused kernel, backward,
+//! Adam, and the updates of the occupancy grid in between.
+//!
+//! ```text
+//! cargo bench --bench step -- --config full --seconds 30
+//! ```
+//!
+//! Three measurements: the start, in a process of its own with the driver's cache off; the throughput, as
+//! `nerf train` trains; and the time of each stage, with a wait after each step.
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::{Parser, ValueEnum};
+use nerf::camera::{Camera, Lens};
+use nerf::config::Config;
+use nerf::dataset::{Dataset, OpenOptions};
+use nerf::gpu::timer::Timer;
+use nerf::gpu::{Gpu, adapter};
+use nerf::image::Image;
+use nerf::kernels::{Needs, Plan};
+use nerf::model::{Layout, finest_resolution};
+use nerf::scene;
+use nerf::train::{StepStats, Trainer, Views};
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Steps between two looks at the counters, as in `nerf train`.
+const BLOCK: u32 = 16;
+/// Steps whose stages are timed.
+const TIMED_STEPS: u32 = 64;
+/// Two cores: what CPU time is divided by, so that figures from busy machines can be compared.
+const CORES: f64 = 2.0;
+/// Turn the shader caches on disk off, in Mesa and in NVIDIA's driver.
+const NO_DRIVER_CACHE: [(&str, &str); 2] =
+    [("MESA_SHADER_CACHE_DISABLE", "true"), ("__GL_SHADER_DISK_CACHE", "0")];
+
+/// Measures the speed of a training step.
+#[derive(Debug, Parser)]
+struct Args {
+    /// The network and batch
+    #[arg(long, value_enum, default_value = "full")]
+    config: Preset,
+    /// Change one setting, for example grid.levels=8; may be repeated
+    #[arg(long, value_name = "KEY.PATH=VALUE")]
+    set: Vec<String>,
+    /// The dataset to train on [default: the scene `toys`, 100 views of 100x100 pixels, generated]
+    #[arg(long)]
+    dataset: Option<PathBuf>,
+    /// Seconds of measured training
+    #[arg(long, default_value = "30")]
+    seconds: f64,
+    /// Seconds of training before, so that the occupancy grid has found the scene
+    #[arg(long, default_value = "30")]
+    warm: f64,
+    /// The adapter: an index of `nerf adapters`, or a part of a name [default: the first]
+    #[arg(long)]
+    adapter: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+    /// Also write that object to a file
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Leave the cold start out
+    #[arg(long)]
+    no_start: bool,
+    /// Only take the first step and tell how long its parts took
+    #[arg(long, hide = true)]
+    only_start: bool,
+    /// What cargo adds
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Preset {
+    /// 16 levels of 2^15 entries, networks 64 wide, two hidden layers of colour, 2^15 samples per step
+    Full,
+    /// What `nerf train` takes on a CPU
+    Cpu,
+    /// What `nerf train` takes on a GPU
+    Gpu,
+}
+
+impl Preset {
+    fn config(self) -> Result<Config> {
+        let mut config = if matches!(self, Self::Gpu) { Config::default() } else { Config::for_cpu()? };
+        if matches!(self, Self::Full) {
+            config.merge(&json!({
+                "grid": { "levels": 16, "log2_table": 15 },
+                "network": { "width": 64, "color_layers": 2 },
+                "batch": { "kept": 1 << 15, "samples": 1 << 17, "rays": 1 << 15 },
+            }))?;
+        }
+        Ok(config)
+    }
+}
+
+/// Seconds from the start of a process to the end of its first step, and what they went to.
+#[derive(Debug, Default, Serialize)]
+struct Start {
+    seconds: f64,
+    dataset_seconds: f64,
+    device_seconds: f64,
+    kernels_seconds: f64,
+    warm_up_seconds: f64,
+    first_step_seconds: f64,
+}
+
+/// What was trained in some time.
+#[derive(Debug, Default, Serialize)]
+struct Throughput {
+    seconds: f64,
+    /// Of all threads; `None` where the system does not tell.
+    cpu_seconds: Option<f64>,
+    first_step: u32,
+    steps: u32,
+    rays: u64,
+    marched: u64,
+    /// Kept samples: those with colour and gradients.
+    samples: u64,
+    loss: f64,
+    samples_per_second: f64,
+    /// `samples / (cpu_seconds / 2)`
+    samples_per_second_of_two_cores: Option<f64>,
+}
+
+/// Time of a stage in some steps.
+#[derive(Debug, Serialize)]
+struct StageTime {
+    stage: String,
+    ms_per_step: f64,
+    ns_per_sample: f64,
+    share: f64,
+}
+
+/// A training ready for its first step.
+struct Run {
+    gpu: Arc<Gpu>,
+    trainer: Trainer,
+    learning_rate: f64,
+    start: Start,
+}
+
+fn main() -> Result<()> {
+    let began = Instant::now();
+    let args = Args::parse();
+    let generated = tempfile::tempdir()?;
+    let dataset = match &args.dataset {
+        Some(path) => path.clone(),
+        None => generate(&generated.path().join("toys"))?,
+    };
+    if args.only_start {
+        return only_start(&args, &dataset, began);
+    }
+    let start = if args.no_start { None } else { Some(cold_start(&args, &dataset)?) };
+    let mut run = Run::new(&args, &dataset)?;
+    say("warming up");
+    run.train(args.warm)?;
+    say("measuring");
+    let throughput = run.train(args.seconds)?;
+    ensure!(throughput.samples > 0, "the rays meet nothing: the field is empty");
+    say("timing the stages");
+    let stages = run.stages()?;
+    let result = result(&args, &run, start.as_ref(), &throughput, &stages);
+    if let Some(file) = &args.out {
+        std::fs::write(file, format!("{result}\n")).with_context(|| format!("writing {}", file.display()))?;
+    }
+    let text = if args.json { result.to_string() } else { table(&result, start, &throughput, &stages) };
+    Ok(writeln!(std::io::stdout(), "{text}")?)
+}
+
+fn say(text: &str) {
+    // A lost line of progress is no reason to fail.
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+fn generate(folder: &Path) -> Result<PathBuf> {
+    say("generating the scene toys");
+    let options = scene::Generate {
+        views: scene::Views::of_total(100)?,
+        size: (100, 100),
+        ..scene::Generate::new("toys")
+    };
+    scene::generate(&options, folder, &|_| {})?;
+    Ok(folder.to_owned())
+}
+
+/// Starts this program again without the driver's cache, and waits for its first step.
+fn cold_start(args: &Args, dataset: &Path) -> Result<Start> {
+    say("starting from cold");
+    let mut command = Command::new(std::env::current_exe()?);
+    command.arg("--only-start").arg("--dataset").arg(dataset).envs(NO_DRIVER_CACHE);
+    let preset = args.config.to_possible_value().context("a preset has a name")?;
+    command.args(["--config", preset.get_name()]);
+    command.args(args.set.iter().flat_map(|set| ["--set", set]));
+    command.args(args.adapter.iter().flat_map(|name| ["--adapter", name]));
+    let clock = Instant::now();
+    let mut child = command.stdout(Stdio::piped()).spawn()?;
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().context("a piped stdout")?).read_line(&mut line)?;
+    let seconds = clock.elapsed().as_secs_f64();
+    ensure!(child.wait()?.success(), "the cold start failed");
+    let parts: Value = serde_json::from_str(&line).context("reading the cold start")?;
+    let part = |key: &str| parts[key].as_f64().with_context(|| format!("the cold start lacks {key}"));
+    Ok(Start {
+        seconds,
+        dataset_seconds: part("dataset_seconds")?,
+        device_seconds: part("device_seconds")?,
+        kernels_seconds: part("kernels_seconds")?,
+        warm_up_seconds: part("warm_up_seconds")?,
+        first_step_seconds: part("first_step_seconds")?,
+    })
+}
+
+/// The child of [`cold_start`].
+fn only_start(args: &Args, dataset: &Path, began: Instant) -> Result<()> {
+    let mut run = Run::new(args, dataset)?;
+    let clock = Instant::now();
+    run.trainer.step(run.learning_rate, None)?;
+    run.trainer.report()?;
+    run.start.first_step_seconds = clock.elapsed().as_secs_f64();
+    run.start.seconds = began.elapsed().as_secs_f64();
+    Ok(writeln!(std::io::stdout(), "{}", serde_json::to_string(&run.start)?)?)
+}
+
+impl Run {
+    fn new(args: &Args, dataset: &Path) -> Result<Self> {
+        let mut start = Start::default();
+        let mut clock = Instant::now();
+        let mut lap = || std::mem::replace(&mut clock, Instant::now()).elapsed().as_secs_f64();
+        let dataset = Dataset::open(dataset, &OpenOptions::default())?;
+        let images = dataset.load_images(&dataset.train, &|_| {})?;
+        start.dataset_seconds = lap();
+        let gpu = Arc::new(Gpu::open(&adapter::choose(args.adapter.as_deref())?)?);
+        start.device_seconds = lap();
+        let mut config = args.config.config()?;
+        for assignment in &args.set {
+            config.set(assignment)?;
+        }
+        config.validate()?;
+        let learning_rate = config.optimizer.learning_rate;
+        let mut trainer = trainer(&gpu, config, &dataset, &images)?;
+        start.kernels_seconds = lap();
+        trainer.warm_up()?;
+        start.warm_up_seconds = lap();
+        Ok(Self { gpu, trainer, learning_rate, start })
+    }
+
+    /// Trains for some seconds, in blocks.
+    fn train(&mut self, seconds: f64) -> Result<Throughput> {
+        let (clock, cpu) = (Instant::now(), cpu_seconds());
+        let mut sum = Throughput { first_step: self.trainer.steps(), ..Throughput::default() };
+        while clock.elapsed().as_secs_f64() < seconds {
+            for _ in 0..BLOCK {
+                self.trainer.step(self.learning_rate, None)?;
+            }
+            sum.add(self.trainer.report()?);
+        }
+        sum.seconds = clock.elapsed().as_secs_f64();
+        sum.cpu_seconds = cpu.zip(cpu_seconds()).map(|(before, after)| after - before);
+        if !sum.loss.is_finite() {
+            bail!("the loss is not finite any more: the training diverged");
+        }
+        let samples = sum.samples as f64;
+        sum.samples_per_second = samples / sum.seconds.max(1e-9);
+        sum.samples_per_second_of_two_cores = sum.cpu_seconds.map(|cpu| samples / (cpu / CORES).max(1e-9));
+        Ok(sum)
+    }
+
+    /// The time of each stage; empty where the adapter has no timestamps.
+    fn stages(&mut self) -> Result<Vec<StageTime>> {
+        let Ok(mut timer) = Timer::new(&self.gpu) else { return Ok(Vec::new()) };
+        let clock = Instant::now();
+        for _ in 0..TIMED_STEPS {
+            self.trainer.step(self.learning_rate, Some(&mut timer))?;
+        }
+        let stats = self.trainer.report()?;
+        let seconds = clock.elapsed().as_secs_f64();
+        Ok(stage_times(timer.totals(), seconds, stats))
+    }
+}
+
+impl Throughput {
+    fn add(&mut self, block: StepStats) {
+        self.steps += block.steps;
+        self.rays += block.rays;
+        self.marched += block.marched;
+        self.samples += block.samples;
+        self.loss = block.loss;
+    }
+}
+
+fn trainer(gpu: &Arc<Gpu>, config: Config, dataset: &Dataset, images: &[Image]) -> Result<Trainer> {
+    let cameras: Vec<Camera> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
+    let finest = match config.grid.finest {
+        0 => finest_resolution(config.grid.base, &dataset.bounds, &cameras),
+        finest => finest,
+    };
+    let layout = Layout::new(&config, finest);
+    let needs = Needs {
+        lens: cameras.iter().any(|camera| camera.lens != Lens::Pinhole),
+        hdr: dataset.is_hdr,
+        cascades: dataset.bounds.cascades,
+        box_min: [0.0; 3],
+        box_max: [1.0; 3],
+        cameras: cameras.len(),
+    };
+    let plan = Plan::new(gpu, config, layout, needs);
+    Trainer::new(gpu, plan, &Views { cameras: &cameras, images, bounds: &dataset.bounds })
+}
+
+/// Slowest first; what no stage accounts for comes last.
+fn stage_times(totals: &BTreeMap<String, f64>, all_seconds: f64, stats: StepStats) -> Vec<StageTime> {
+    let mut stages: Vec<_> = totals.iter().map(|(stage, &seconds)| (stage.clone(), seconds)).collect();
+    stages.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let staged: f64 = totals.values().sum();
+    stages.push(("occupancy updates, submission, waiting".into(), (all_seconds - staged).max(0.0)));
+    let time = |(stage, seconds): (String, f64)| StageTime {
+        stage,
+        ms_per_step: 1e3 * seconds / f64::from(stats.steps.max(1)),
+        ns_per_sample: 1e9 * seconds / stats.samples.max(1) as f64,
+        share: seconds / all_seconds,
+    };
+    stages.into_iter().map(time).collect()
+}
+
+/// User and system time of this process, all threads together. Linux counts it in hundredths of a second.
+fn cpu_seconds() -> Option<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The second field, the name in parentheses, may hold spaces; user and system time are the 14th and 15th.
+    let (_, fields) = stat.rsplit_once(')')?;
+    let ticks = fields.split_whitespace().skip(11).take(2).map(|field| field.parse::<f64>().ok());
+    Some(ticks.sum::<Option<f64>>()? / 100.0)
+}
+
+fn result(
+    args: &Args,
+    run: &Run,
+    start: Option<&Start>,
+    throughput: &Throughput,
+    stages: &[StageTime],
+) -> Value {
+    let (info, config) = (&run.gpu.info, &run.trainer.plan().config);
+    let dataset = args.dataset.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy());
+    json!({
+        "preset": args.config.to_possible_value().map(|value| value.get_name().to_owned()),
+        "config": config,
+        "dataset": dataset.unwrap_or_else(|| "toys, 100x100, generated".into()),
+        "adapter": info.name,
+        "driver": format!("{} {}", info.driver, info.driver_info).trim(),
+        "device_bytes": run.trainer.workspace().bytes(),
+        "cold_start": start,
+        "throughput": throughput,
+        "stages": stages,
+    })
+}
+
+fn table(result: &Value, start: Option<Start>, throughput: &Throughput, stages: &[StageTime]) -> String {
+    let word = |key: &str| result[key].as_str().unwrap_or_default().to_owned();
+    let mut lines = vec![
+        format!("config     {}", word("preset")),
+        format!("dataset    {}", word("dataset")),
+        format!("adapter    {} ({})", word("adapter"), word("driver")),
+        format!("memory     {} MiB on the device", result["device_bytes"].as_u64().unwrap_or(0) >> 20),
+    ];
+    lines.extend(start.map(|s| {
+        format!(
+            "cold start {:.2} s to the end of the first step: dataset {:.2}, device {:.2}, kernels {:.2}, \
+             warm-up {:.2}, step {:.3}",
+            s.seconds,
+            s.dataset_seconds,
+            s.device_seconds,
+            s.kernels_seconds,
+            s.warm_up_seconds,
+            s.first_step_seconds
+        )
+    }));
+    let Throughput { first_step, steps, seconds, samples, marched, rays, .. } = throughput;
+    let per_step = |count: &u64| count / u64::from((*steps).max(1));
+    lines.push(format!(
+        "steps      {first_step} to {} in {seconds:.1} s: {:.1} ms each with {} rays, {} marched and {} kept \
+         samples",
+        first_step + steps,
+        1e3 * seconds / f64::from((*steps).max(1)),
+        per_step(rays),
+        per_step(marched),
+        per_step(samples),
+    ));
+    lines.push(format!("samples/s  {:.0} kept, by the clock", throughput.samples_per_second));
+    lines.extend(
+        throughput
+            .samples_per_second_of_two_cores
+            .map(|rate| format!("samples/s  {rate:.0} kept, by CPU time on two cores")),
+    );
+    if !stages.is_empty() {
+        lines.push(format!("\n{:40} {:>9} {:>10} {:>7}", "stage", "ms/step", "ns/sample", "share"));
+    }
+    lines.extend(stages.iter().map(|s| {
+        let share = 100.0 * s.share;
+        format!("{:40} {:9.2} {:10.1} {share:6.1}%", s.stage, s.ms_per_step, s.ns_per_sample)
+    }));
+    lines.join("\n")
+}

@@ -1,0 +1,117 @@
+//! The structs that kernels and the host share.
+
+use crate::camera::Lens;
+use crate::dataset::Bounds;
+use crate::gpu_struct;
+
+gpu_struct! {
+    /// The numbers that change from step to step.
+    Step {
+        /// Start of this step's random numbers.
+        stream: u32,
+        /// First pixel of a chunk of a view.
+        first_pixel: u32,
+        /// First cell of an occupancy chunk.
+        first_cell: u32,
+        /// Distance between its cells.
+        cell_stride: u32,
+        /// Number of its cells.
+        cell_count: u32,
+        /// Adam's learning rate.
+        learning_rate: f32,
+        /// 1 / (1 - beta_1^t).
+        first_correction: f32,
+        /// 1 / (1 - beta_2^t).
+        second_correction: f32,
+    }
+}
+
+gpu_struct! {
+    /// What is counted on the device; see `shaders/common/counters.wgsl`.
+    Counters {
+        /// Rays of the next step.
+        rays: u32,
+        /// Rays whose samples fit.
+        rays_used: u32,
+        /// Marched samples.
+        samples: u32,
+        /// Marched samples all rays asked for.
+        samples_wanted: u32,
+        /// Kept samples.
+        kept: u32,
+        /// Kept samples all rays asked for.
+        kept_wanted: u32,
+        /// Steps since the sums were cleared.
+        sum_steps: u32,
+        /// Rays since then.
+        sum_rays: u32,
+        /// Marched samples since then.
+        sum_samples: u32,
+        /// Kept samples since then.
+        sum_kept: u32,
+        /// Sum of the steps' losses.
+        sum_loss: f32,
+        /// Sum of the steps' mean squared colour errors.
+        sum_color_error: f32,
+    }
+}
+
+gpu_struct! {
+    /// A camera in box space; see `shaders/common/camera.wgsl`.
+    Camera {
+        /// Position.
+        origin: [f32; 3],
+        /// Pixels per row.
+        width: u32,
+        /// +X axis.
+        right: [f32; 3],
+        /// Rows.
+        height: u32,
+        /// +Y axis.
+        up: [f32; 3],
+        /// Index of the image's first pixel.
+        first_texel: u32,
+        /// +Z axis, away from the view.
+        back: [f32; 3],
+        /// Padding.
+        unused: u32,
+        /// Focal lengths.
+        focal_px: [f32; 2],
+        /// Principal point.
+        center_px: [f32; 2],
+        /// k1..k4.
+        radial: [f32; 4],
+        /// p1, p2.
+        tangential: [f32; 2],
+        /// Padding.
+        unused_2: [f32; 2],
+    }
+}
+
+impl Camera {
+    /// `camera` in the space where the scene's box is the unit cube; its pixels start at `first_texel`.
+    #[must_use]
+    pub fn in_box(camera: &crate::camera::Camera, bounds: &Bounds, first_texel: u32) -> Self {
+        let pose = camera.world_from_camera;
+        let side = 2.0 * bounds.outer_half();
+        let axis = |axis: glam::DVec3| axis.normalize_or_zero().as_vec3().to_array();
+        let (radial, tangential) = match camera.lens {
+            Lens::Pinhole => ([0.0; 4], [0.0; 2]),
+            Lens::OpenCv { k, p } => (k, p),
+        };
+        Self {
+            origin: ((pose.translation - bounds.min()) / side).as_vec3().to_array(),
+            width: camera.width,
+            right: axis(pose.matrix3.x_axis),
+            height: camera.height,
+            up: axis(pose.matrix3.y_axis),
+            first_texel,
+            back: axis(pose.matrix3.z_axis),
+            focal_px: camera.focal_px.as_vec2().to_array(),
+            center_px: camera.center_px.as_vec2().to_array(),
+            radial: radial.map(|k| k as f32),
+            tangential: tangential.map(|p| p as f32),
+            ..Self::default()
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Buffers and tensors by name.
+
+use crate::gpu::Gpu;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::kernel::{Bound, Kernel, Resource};
+use crate::gpu::tensor::Tensor;
+use anyhow::Result;
+
+/// Buffers and tensors by name: what kernels are bound to.
+#[derive(Clone, Debug, Default)]
+pub struct Workspace {
+    buffers: Vec<Buffer>,
+    tensors: Vec<Tensor>,
+}
+
+impl Workspace {
+    /// Adds a buffer; its name must be new.
+    pub fn add(&mut self, buffer: Buffer) {
+        debug_assert!(
+            self.buffers.iter().all(|b| b.name != buffer.name),
+            "two buffers named {}",
+            buffer.name
+        );
+        self.buffers.push(buffer);
+    }
+
+    /// Adds a tensor; its name must be new.
+    pub fn add_tensor(&mut self, tensor: Tensor) {
+        debug_assert!(
+            self.tensors.iter().all(|t| t.name != tensor.name),
+            "two tensors named {}",
+            tensor.name
+        );
+        self.tensors.push(tensor);
+    }
+
+    /// The buffer `name`.
+    ///
+    /// # Panics
+    /// When there is none: names are fixed in this module and its children.
+    #[must_use]
+    pub fn get(&self, name: &str) -> &Buffer {
+        let found = self.buffers.iter().find(|buffer| buffer.name == name);
+        found.unwrap_or_else(|| unreachable!("no buffer named '{name}'"))
+    }
+
+    /// The tensor `name`.
+    ///
+    /// # Panics
+    /// When there is none: names are fixed in this module and its children.
+    #[must_use]
+    pub fn tensor(&self, name: &str) -> &Tensor {
+        let found = self.tensors.iter().find(|tensor| tensor.name == name);
+        found.unwrap_or_else(|| unreachable!("no tensor named '{name}'"))
+    }
+
+    /// Reads the first `count` values of a buffer or tensor, waiting for the device.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn read<T: bytemuck::Pod>(&self, gpu: &Gpu, name: &str, count: usize) -> Result<Vec<T>> {
+        match self.tensors.iter().find(|tensor| tensor.name == name) {
+            Some(tensor) => gpu.read_tensor(tensor, count),
+            None => gpu.read(self.get(name), 0, count),
+        }
+    }
+
+    /// Writes `data` at the start of a buffer or tensor, before the next submission.
+    pub fn write<T: bytemuck::Pod>(&self, gpu: &Gpu, name: &str, data: &[T]) {
+        match self.tensors.iter().find(|tensor| tensor.name == name) {
+            Some(tensor) => gpu.write_tensor(tensor, data),
+            None => gpu.write(self.get(name), 0, data),
+        }
+    }
+
+    /// Shares a buffer or a tensor of `other`.
+    pub fn share(&mut self, other: &Self, name: &str) {
+        self.buffers.extend(other.buffers.iter().find(|buffer| buffer.name == name).cloned());
+        self.tensors.extend(other.tensors.iter().find(|tensor| tensor.name == name).cloned());
+    }
+
+    /// Binds `kernel` to what it uses; `renamed` pairs a WGSL name with the name here.
+    ///
+    /// # Errors
+    /// When one is missing.
+    pub fn bind(&self, gpu: &Gpu, kernel: &Kernel, renamed: &[(&str, &str)]) -> Result<Bound> {
+        self.bind_with(gpu, kernel, renamed, &[])
+    }
+
+    /// As [`Workspace::bind`], with further resources.
+    ///
+    /// # Errors
+    /// When one is missing.
+    pub fn bind_with(
+        &self,
+        gpu: &Gpu,
+        kernel: &Kernel,
+        renamed: &[(&str, &str)],
+        further: &[Resource<'_>],
+    ) -> Result<Bound> {
+        let mut resources = further.to_vec();
+        for (name, here) in renamed {
+            resources.extend(self.buffers.iter().find(|b| b.name == *here).map(|b| b.named(name)));
+            resources.extend(self.tensors.iter().find(|t| t.name == *here).map(|t| t.named(name)));
+        }
+        resources.extend(self.buffers.iter().map(Buffer::resource));
+        resources.extend(self.tensors.iter().map(|tensor| tensor.named(tensor.name)));
+        kernel.bind(gpu, &resources)
+    }
+
+    /// Bytes of everything in it.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let buffers: u64 = self.buffers.iter().map(|buffer| buffer.raw.size()).sum();
+        buffers + self.tensors.iter().map(Tensor::bytes).sum::<u64>()
+    }
+}
