@@ -18,7 +18,7 @@ fn main(@builtin(local_invocation_id) lane: vec3<u32>, @builtin(workgroup_id) gr
     // Coarse and fine levels in turn, so that the groups have the same work.
     let l = lane.x * (LEVELS / 8u) + group.x;
     let level = levels[l];
-    let odd = (l & 1u) == 0u;
+    let odd = (l & 1u) == 1u;
     for (var index = 0u; index < counters.kept; index++) {
         let both = d_encoding_load(index * (LEVELS / 2u) + l / 2u);
         let gradient = select(both.xy, both.zw, odd);

@@ -226,16 +226,21 @@ impl Default for Optimizer {
 }
 
 const CPU_PRESET: &str = include_str!("../configs/cpu.json");
+const CPU_CAPTURE_PRESET: &str = include_str!("../configs/cpu_capture.json");
 
 impl Config {
-    /// The defaults for a software adapter: a smaller table, batch and network.
+    /// The defaults for a software adapter: a smaller table, batch and network, and longer steps in a capture
+    /// whose box is larger than the inner cube.
     ///
     /// # Errors
-    /// Never for the preset that is compiled in, which the tests read.
-    pub fn for_cpu() -> Result<Self> {
+    /// Never for the presets that are compiled in, which the tests read.
+    pub fn for_cpu(is_capture: bool) -> Result<Self> {
         let mut config = Self::default();
-        let preset = serde_json::from_str(CPU_PRESET).context("reading the preset for CPU adapters")?;
-        config.merge(&preset)?;
+        let presets = [CPU_PRESET, CPU_CAPTURE_PRESET];
+        for preset in &presets[..1 + usize::from(is_capture)] {
+            let changes = serde_json::from_str(preset).context("reading the preset for CPU adapters")?;
+            config.merge(&changes)?;
+        }
         Ok(config)
     }
 

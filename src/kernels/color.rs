@@ -47,6 +47,7 @@ pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()>
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
     let floor = match selection {
         Selection::Training => plan.config.selection.weight_floor as f32,
+        // Whatever is lighter does not show in 32 bits.
         Selection::All => 1e-12,
     };
     let select = plan.generated_kernel(

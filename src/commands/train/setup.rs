@@ -123,9 +123,9 @@ fn configure(mut config: Config, args: &Train) -> Result<Config> {
 }
 
 fn first(args: &Train, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
-    let defaults = if gpu.is_cpu() { Config::for_cpu()? } else { Config::default() };
-    let mut config = configure(defaults, args)?;
     let bounds = dataset.bounds.clone();
+    let defaults = if gpu.is_cpu() { Config::for_cpu(bounds.cascades > 1)? } else { Config::default() };
+    let mut config = configure(defaults, args)?;
     let cameras = cameras(dataset, &dataset.train);
     if config.grid.finest == 0 {
         config.grid.finest = finest_resolution(config.grid.base, &bounds, &cameras);
