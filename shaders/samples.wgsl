@@ -27,7 +27,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let u = first + f32(word_index * 32u + countTrailingZeros(word));
             word &= word - 1u;
             let t = stepping_distance(u);
-            let delta = (stepping_distance(u + 1.0) - t) * DENSITY_SCALE;
+            let delta = stepping_length(u) * DENSITY_SCALE;
             samples_store(span.x + written, vec4(ray.origin + t * ray.direction, delta));
             written++;
         }

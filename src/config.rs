@@ -319,7 +319,7 @@ impl Config {
         real("march.near", march.near, 0.0, 10.0)?;
         real("occupancy.decay", occupancy.decay, 0.0, 1.0)?;
         real("occupancy.threshold", occupancy.threshold, 0.0, 1e6)?;
-        real("selection.weight_floor", selection.weight_floor, 0.0, 1.0)?;
+        real("selection.weight_floor", selection.weight_floor, 1e-12, 1.0)?;
         real("selection.keep_probability", selection.keep_probability, 0.0, 1.0)?;
         real("selection.stop_transmittance", selection.stop_transmittance, 0.0, 0.5)?;
         real("optimizer.learning_rate", optimizer.learning_rate, 0.0, 1e3)?;

@@ -118,7 +118,7 @@ impl Plan {
         };
         let shared_weights = gpu.is_cpu() && gpu.has_subgroups_of(8);
         let rows = match (gpu.is_cpu(), shared_weights) {
-            (true, true) => 8,
+            (true, true) => 4,
             (true, false) => 4,
             (false, _) => 2,
         };

@@ -23,9 +23,12 @@ struct GridCell {
 // What is common to several corners is computed once; everything has constant indices, so that software
 // drivers keep it in registers.
 fn grid_cell(position: vec3<f32>, level: Level) -> GridCell {
-    let scaled = clamp(position, vec3(0.0), vec3(1.0)) * f32(level.resolution);
-    let corner = min(vec3<u32>(scaled), vec3(level.resolution - 1u));
-    let far = scaled - vec3<f32>(corner);
+    let cells = i32(level.resolution);
+    let scaled = clamp(position, vec3(0.0), vec3(1.0)) * f32(cells);
+    // Signed, since vector units convert signed integers only.
+    let signed_corner = min(vec3<i32>(scaled), vec3(cells - 1));
+    let corner = vec3<u32>(signed_corner);
+    let far = scaled - vec3<f32>(signed_corner);
     let near = 1.0 - far;
     let side = level.resolution + 1u;
     let dense = level.dense == 1u;

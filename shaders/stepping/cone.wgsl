@@ -17,3 +17,17 @@ fn stepping_distance(u: f32) -> f32 {
     }
     return STEPPING_LINEAR_END * exp(min(u - linear, cone) * LOG_CONE) + max(u - linear - cone, 0.0) * STEP_MAX;
 }
+
+// Length of the step that begins at u. Where a step lies within one of the three parts it is not a difference of
+// distances, which would cancel.
+fn stepping_length(u: f32) -> f32 {
+    let linear = 1.0 / CONE;
+    if u + 1.0 <= linear {
+        return STEP_MIN;
+    }
+    let t = stepping_distance(u);
+    if u >= linear && t * (1.0 + CONE) <= STEPPING_CONE_END {
+        return t * CONE;
+    }
+    return stepping_distance(u + 1.0) - t;
+}
