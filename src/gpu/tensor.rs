@@ -152,7 +152,7 @@ impl Tensor {
         match &self.place {
             Place::Buffer(buffer) => encoder.clear_buffer(buffer, 0, None),
             Place::Texture(texture, _) => {
-                encoder.clear_texture(texture, &wgpu::ImageSubresourceRange::default())
+                encoder.clear_texture(texture, &wgpu::ImageSubresourceRange::default());
             }
         }
     }
