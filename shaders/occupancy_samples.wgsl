@@ -1,7 +1,9 @@
-// One random position in each cell of a chunk, as samples for the density network.
+// One random position in each visited cell of a chunk, as samples for the density network.
 // Needs: random, step, counters, occupancy.
 
 var<storage, read_write> counters: Counters;
+// Indices of the cells that can hold something.
+var<storage, read> visible_cells: array<u32>;
 tensor<write> samples: vec4<f32>;
 
 @compute @workgroup_size(64)
@@ -13,7 +15,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if index >= step.cell_count {
         return;
     }
-    let cell = step.first_cell + index * step.cell_stride;
+    let cell = visible_cells[step.first_cell + index * step.cell_stride];
     let within = cell % (CELLS * CELLS * CELLS);
     let cascade = cell / (CELLS * CELLS * CELLS);
     let corner = vec3(within % CELLS, (within / CELLS) % CELLS, within / (CELLS * CELLS));

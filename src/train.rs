@@ -25,6 +25,7 @@ pub struct Trainer {
     stages: Vec<Stage>,
     occupancy: occupancy::Update,
     step: u32,
+    visible_cells: u32,
     /// What every cell of the occupancy grid starts from: 0, or -1 where nothing can be.
     first_occupancy: Vec<f32>,
 }
@@ -82,17 +83,26 @@ impl Trainer {
         density::allocate(gpu, &plan, &mut workspace)?;
         color::allocate(gpu, &plan, &mut workspace)?;
         training::allocate(gpu, &plan, &mut workspace)?;
-        occupancy::allocate(gpu, &mut workspace)?;
+        let hidden =
+            visibility::hidden_cells(views.cameras, views.images, views.bounds, plan.config.occupancy.cells);
+        let visible: Vec<u32> =
+            (0..).zip(&hidden).filter(|(_, hidden)| !**hidden).map(|(cell, _)| cell).collect();
+        occupancy::allocate(gpu, &mut workspace, &visible)?;
         upload(gpu, views, &mut workspace)?;
         let stages = step_stages(gpu, &plan, &workspace)?;
         let occupancy = occupancy::Update::new(gpu, &plan, &workspace)?;
-        let cells = plan.config.occupancy.cells;
-        let first_occupancy = visibility::hidden_cells(views.cameras, views.images, views.bounds, cells)
-            .into_iter()
-            .map(|hidden| if hidden { -1.0 } else { 0.0 })
-            .collect();
-        let mut trainer =
-            Self { gpu: Arc::clone(gpu), plan, workspace, stages, occupancy, step: 0, first_occupancy };
+        let first_occupancy = hidden.iter().map(|&hidden| if hidden { -1.0 } else { 0.0 }).collect();
+        let visible_cells = visible.len() as u32;
+        let mut trainer = Self {
+            gpu: Arc::clone(gpu),
+            plan,
+            workspace,
+            stages,
+            occupancy,
+            step: 0,
+            first_occupancy,
+            visible_cells,
+        };
         trainer.reset()?;
         Ok(trainer)
     }
@@ -260,7 +270,7 @@ impl Trainer {
         let grid = &self.plan.config.occupancy;
         let stride = if all { 1 } else { grid.stride };
         let first = (self.step / grid.interval) % stride;
-        let cells = (self.plan.cell_count() as u32 - first).div_ceil(stride);
+        let cells = self.visible_cells.saturating_sub(first).div_ceil(stride);
         let most = self.plan.config.batch.samples as u32;
         for begin in (0..cells).step_by(most as usize) {
             let count = most.min(cells - begin);

@@ -19,12 +19,13 @@ const ENCODE: usize = 1;
 const ENCODE_END: usize = 2;
 const LAYERS_END: usize = 4;
 
-/// Allocates what only the update needs.
+/// Allocates what only the update needs; `visible` lists the cells that can hold something.
 ///
 /// # Errors
 /// When the adapter cannot hold it.
-pub fn allocate(gpu: &Gpu, workspace: &mut Workspace) -> Result<()> {
+pub fn allocate(gpu: &Gpu, workspace: &mut Workspace, visible: &[u32]) -> Result<()> {
     workspace.add(gpu.storage::<f32>("occupancy_mean", 1)?);
+    workspace.add(gpu.storage_with("visible_cells", visible)?);
     Ok(())
 }
 

@@ -462,6 +462,11 @@ impl Bench {
     }
 }
 
+/// The cells that can hold something: all but every fifth.
+pub(crate) fn visible_cells(plan: &Plan) -> Vec<u32> {
+    (0..plan.cell_count() as u32).filter(|cell| cell % 5 != 0).collect()
+}
+
 fn allocate(gpu: &Gpu, plan: &Plan) -> anyhow::Result<Workspace> {
     let mut workspace = Workspace::default();
     marching::allocate(gpu, plan, &mut workspace)?;
@@ -469,7 +474,7 @@ fn allocate(gpu: &Gpu, plan: &Plan) -> anyhow::Result<Workspace> {
     density::allocate(gpu, plan, &mut workspace)?;
     color::allocate(gpu, plan, &mut workspace)?;
     training::allocate(gpu, plan, &mut workspace)?;
-    occupancy::allocate(gpu, &mut workspace)?;
+    occupancy::allocate(gpu, &mut workspace, &visible_cells(plan))?;
     workspace.add(gpu.storage::<f32>("weights", plan.config.batch.samples)?);
     Ok(workspace)
 }
