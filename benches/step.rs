@@ -79,7 +79,8 @@ struct Args {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Preset {
-    /// 16 levels of 2^15 entries, networks 64 wide, two hidden layers of colour, 2^15 samples per step
+    /// 16 levels of 2^15 entries, networks 64 wide, two hidden layers of colour, 2^15 samples per step; every
+    /// marched sample up to where its ray is opaque is trained on, as in instant-ngp
     Full,
     /// What `nerf train` takes on a CPU
     Cpu,
@@ -94,6 +95,7 @@ impl Preset {
             config.merge(&json!({
                 "grid": { "levels": 16, "log2_table": 15 },
                 "network": { "width": 64, "color_layers": 2 },
+                "selection": { "keep_probability": 1 },
                 "batch": { "kept": 1 << 15, "samples": 1 << 17, "rays": 1 << 15 },
             }))?;
         }
@@ -305,10 +307,9 @@ fn trainer(gpu: &Arc<Gpu>, config: Config, dataset: &Dataset, images: &[Image]) 
     let layout = Layout::new(&config, finest);
     let needs = Needs {
         lens: cameras.iter().any(|camera| camera.lens != Lens::Pinhole),
+        alpha: images.iter().any(|image| image.has_alpha),
         hdr: dataset.is_hdr,
         cascades: dataset.bounds.cascades,
-        box_min: [0.0; 3],
-        box_max: [1.0; 3],
         cameras: cameras.len(),
     };
     let plan = Plan::new(gpu, config, layout, needs);

@@ -74,14 +74,12 @@ pub mod dispatch {
 pub struct Needs {
     /// Some camera has lens distortion.
     pub lens: bool,
+    /// Some image has alpha.
+    pub alpha: bool,
     /// Pixels are linear floats.
     pub hdr: bool,
     /// Cascades of the occupancy grid; 1 for a bounded scene.
     pub cascades: u32,
-    /// The scene's box inside of box space.
-    pub box_min: [f32; 3],
-    /// Its other corner.
-    pub box_max: [f32; 3],
     /// Training cameras.
     pub cameras: usize,
 }
@@ -101,10 +99,9 @@ pub struct Plan {
     pub accumulation: Accumulation,
     /// Where tensors live.
     pub memory: Memory,
+    /// Chunks of samples whose weight gradients are summed apart: what runs side by side.
+    pub chunks: usize,
 }
-
-/// Chunks of samples whose weight gradients are summed apart.
-pub const CHUNKS: usize = 32;
 
 impl Plan {
     /// Chooses what depends on the adapter.
@@ -122,8 +119,9 @@ impl Plan {
             (true, false) => 4,
             (false, _) => 2,
         };
+        let chunks = if gpu.is_cpu() { 32 } else { 512 };
         let product = layer::Product { rows, shared_weights };
-        Self { config, layout, needs, product, accumulation, memory: gpu.fast_memory() }
+        Self { config, layout, needs, product, accumulation, memory: gpu.fast_memory(), chunks }
     }
 
     /// The smallest step in box units.
@@ -204,7 +202,7 @@ impl Plan {
             ("DENSITY_OUTPUTS", DENSITY_OUTPUTS),
             ("DENSITY_QUADS", DENSITY_OUTPUTS / 4),
             ("MLP_QUADS", layout.quads),
-            ("CHUNKS", CHUNKS),
+            ("CHUNKS", self.chunks),
             ("SAMPLES_PER_THREAD", self.product.rows),
             ("CELLS", config.occupancy.cells as usize),
             ("CELL_COUNT", self.cell_count()),
@@ -232,7 +230,7 @@ impl Plan {
     }
 
     fn numbers(&self, source: Source) -> Source {
-        let Self { config, needs, .. } = self;
+        let config = &self.config;
         let floats = [
             ("STEP_MIN", self.step_min()),
             ("STEP_MAX", 1.0 / f64::from(config.occupancy.cells)),
@@ -251,10 +249,7 @@ impl Plan {
             ("GRADIENT_SCALE", 4_194_304.0),
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
-        source
-            .constant("BACKGROUND", vec3(config.background.solid()))
-            .constant("BOX_MIN", vec3(needs.box_min))
-            .constant("BOX_MAX", vec3(needs.box_max))
+        source.constant("BACKGROUND", vec3(config.background.solid()))
     }
 
     fn lens(&self) -> Part {
@@ -266,7 +261,11 @@ impl Plan {
     }
 
     fn pixels(&self) -> Part {
-        if self.needs.hdr { part!("pixels/linear.wgsl") } else { part!("pixels/srgb8.wgsl") }
+        match (self.needs.hdr, self.needs.alpha) {
+            (true, _) => part!("pixels/linear.wgsl"),
+            (false, true) => part!("pixels/srgb8.wgsl"),
+            (false, false) => part!("pixels/srgb8_opaque.wgsl"),
+        }
     }
 
     fn activation(&self) -> Part {

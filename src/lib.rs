@@ -41,10 +41,9 @@
 //! let layout = model::Layout::new(&config, finest);
 //! let needs = Needs {
 //!     lens: false,
+//!     alpha: images.iter().any(|image| image.has_alpha),
 //!     hdr: dataset.is_hdr,
 //!     cascades: dataset.bounds.cascades,
-//!     box_min: [0.0; 3],
-//!     box_max: [1.0; 3],
 //!     cameras: cameras.len(),
 //! };
 //! let plan = Plan::new(&gpu, config, layout, needs);

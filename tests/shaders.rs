@@ -61,10 +61,10 @@ fn definitions(text: &str) -> Vec<String> {
 
 fn plan(memory: Memory, cascades: u32) -> Plan {
     let config = Config::default();
-    let needs = Needs { lens: true, hdr: false, cascades, box_min: [0.0; 3], box_max: [1.0; 3], cameras: 3 };
+    let needs = Needs { lens: true, alpha: true, hdr: false, cascades, cameras: 3 };
     let layout = Layout::new(&config, 2048);
     let product = Product { rows: 2, shared_weights: false };
-    Plan { config, layout, needs, product, accumulation: Accumulation::Exchange, memory }
+    Plan { config, layout, needs, product, accumulation: Accumulation::Exchange, memory, chunks: 32 }
 }
 
 /// Everything that was linked.

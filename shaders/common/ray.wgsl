@@ -9,12 +9,12 @@ struct Ray {
     t_far: f32,
 }
 
-// Slab test against BOX_MIN..BOX_MAX; zero components of the direction are replaced by tiny ones.
+// Slab test against the unit cube; zero components of the direction are replaced by tiny ones.
 fn ray_through_box(origin: vec3<f32>, direction: vec3<f32>) -> Ray {
     let tiny = vec3(1e-20);
     let safe = select(direction, select(-tiny, tiny, direction >= vec3(0.0)), abs(direction) < tiny);
-    let to_min = (BOX_MIN - origin) / safe;
-    let to_max = (BOX_MAX - origin) / safe;
+    let to_min = -origin / safe;
+    let to_max = (1.0 - origin) / safe;
     let nearer = min(to_min, to_max);
     let farther = max(to_min, to_max);
     let t_near = max(max(nearer.x, nearer.y), max(nearer.z, T_NEAR));

@@ -4,7 +4,7 @@ use super::color::COLOR_HIDDEN;
 use super::density::{layer_stage, quads};
 use super::marching::{SPARE_ROWS, kept_capacity};
 use super::{
-    ADAM, CAMERA, CHUNKS, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_STORE, STEP,
+    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_STORE, STEP,
     Workspace, dispatch,
 };
 use crate::config::Accumulation;
@@ -51,7 +51,7 @@ pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()>
         ("d_density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
         ("d_density_hidden", Element::Vec4, rows * width / 4),
         ("d_encoding", Element::Vec4, rows * layout.encoding() / 4),
-        ("d_weight_chunks", Element::Vec4, CHUNKS * layout.quads),
+        ("d_weight_chunks", Element::Vec4, plan.chunks * layout.quads),
         ("table_moments", Element::Vec4, layout.entries),
     ];
     plan.allocate(gpu, workspace, &tensors)?;
@@ -182,7 +182,7 @@ pub fn weight_gradients(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result
             let uniform = gpu.uniform("tile", &tile)?;
             let renamed = [("layer_input", input), ("d_output", d_output)];
             let bound = workspace.bind_with(gpu, kernel, &renamed, &[uniform.resource()])?;
-            let groups = plan.product.weight_gradient_groups(shape.inputs, shape.outputs / 4, CHUNKS);
+            let groups = plan.product.weight_gradient_groups(shape.inputs, shape.outputs / 4, plan.chunks);
             stages.push(Stage::fixed(bound, groups, 1));
         }
     }

@@ -2,7 +2,7 @@
 
 use nerf::config::Accumulation;
 use nerf::gpu::pass::Stage;
-use nerf::kernels::{CHUNKS, Counters, Step, training};
+use nerf::kernels::{Counters, Step, training};
 use nerf::reference::adam::{Adam, Moments, Schedule};
 
 use crate::bench::{Bench, Random, Setup, quiet_step};
@@ -110,7 +110,7 @@ fn networks_agree_with_the_reference() {
     let adam = reference(&bench, bench.plan.config.optimizer.l2, false);
     for step in 1..=STEPS {
         let learning_rate = f64::from(0.01_f32) / f64::from(step);
-        let chunks = random.numbers(CHUNKS * quads * 4, -0.1, 0.1);
+        let chunks = random.numbers(bench.plan.chunks * quads * 4, -0.1, 0.1);
         let mut gradient = vec![0.0; quads * 4];
         for chunk in chunks.chunks_exact(quads * 4) {
             gradient.iter_mut().zip(chunk).for_each(|(sum, &part)| *sum += f64::from(part));

@@ -108,8 +108,7 @@ impl Setup {
             seed: SEED,
             ..Config::default()
         };
-        let needs =
-            Needs { lens: false, hdr: false, cascades: 1, box_min: [0.0; 3], box_max: [1.0; 3], cameras: 1 };
+        let needs = Needs { lens: false, alpha: true, hdr: false, cascades: 1, cameras: 1 };
         Self { config, needs, finest: 40, product: None, memory: None }
     }
 

@@ -96,6 +96,7 @@ impl Setup {
         let parts = [
             (!needs.lens, "lens model (all cameras are pinholes)"),
             (needs.cascades == 1, "cascades and growing steps (the scene is bounded)"),
+            (!needs.alpha && !needs.hdr, "alpha (the images are opaque)"),
             (!needs.hdr, "linear pixels (the images have 8 bits)"),
             (self.about.config.background != Background::Random, "random backgrounds (not asked for)"),
             (dataset.is_hdr, "8-bit pixels (the images are linear)"),
@@ -143,10 +144,9 @@ fn first(args: &Train, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
         budget: Budget::default(),
         needs: Needs {
             lens: used.any(|&index| dataset.frames[index].camera.lens != Lens::Pinhole),
+            alpha: dataset.train.iter().any(|&index| dataset.frames[index].has_alpha),
             hdr: dataset.is_hdr,
             cascades: bounds.cascades,
-            box_min: [0.0; 3],
-            box_max: [1.0; 3],
             cameras: cameras.len(),
         },
         splits: Splits { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) },
