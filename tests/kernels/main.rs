@@ -7,6 +7,7 @@ mod adam;
 mod bench;
 mod close;
 mod composite;
+mod draw;
 mod encode;
 mod exponential;
 mod layers;
