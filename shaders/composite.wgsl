@@ -4,7 +4,7 @@
 
 var<storage, read> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
-// Log-density, step length and gain.
+// Log-density and step length.
 tensor<read> kept_steps: vec4<f32>;
 tensor<read> color: vec4<f32>;
 var<storage, read> targets: array<vec4<f32>>;

@@ -9,7 +9,7 @@ var<storage, read> kept_spans: array<vec2<u32>>;
 tensor<read> chosen: vec2<u32>;
 // Sample and ray.
 tensor<write> kept_rows: vec2<u32>;
-// Log-density, step length and gain.
+// Log-density and step length.
 tensor<write> kept_steps: vec4<f32>;
 
 @compute @workgroup_size(64)

@@ -109,7 +109,8 @@ pub struct Batch {
 pub struct Selection {
     /// Samples of at least this weight are always kept.
     pub weight_floor: f64,
-    /// Probability that a sample below the floor is kept; its density gradient is divided by it.
+    /// Least probability that a lighter sample is kept, which is its share of the floor otherwise; its step is
+    /// divided by the probability, since it stands for those left out.
     pub keep_probability: f64,
     /// A ray ends where its transmittance falls below this.
     pub stop_transmittance: f64,

@@ -168,11 +168,6 @@ impl Kernel {
         });
         Ok(Bound { label: self.label.clone(), pipeline: self.pipeline.clone(), group })
     }
-
-    /// The names of the buffers it uses.
-    pub fn buffers(&self) -> impl Iterator<Item = &str> {
-        self.bindings.iter().map(|binding| binding.name.as_str())
-    }
 }
 
 fn layout_entries(bindings: &[Binding]) -> Vec<wgpu::BindGroupLayoutEntry> {
