@@ -1,7 +1,6 @@
-// Adam on the networks' weights, with L2: sums the partial gradients of all chunks first, in a fixed order.
-// Needs: step, adam.
+// Adam on the networks' weights; see `weight_sums.wgsl`. Needs: step, adam, usable.
 
-tensor<read> d_weight_chunks: vec4<f32>;
+var<storage, read> d_weights: array<vec4<f32>>;
 var<storage, read_write> mlp: array<vec4<f32>>;
 var<storage, read_write> mlp_first: array<vec4<f32>>;
 var<storage, read_write> mlp_second: array<vec4<f32>>;
@@ -9,15 +8,10 @@ var<storage, read_write> mlp_second: array<vec4<f32>>;
 @compute @workgroup_size(8)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
-    if index >= MLP_QUADS {
+    if index >= MLP_QUADS || !gradients_usable() {
         return;
     }
-    let weight = mlp[index];
-    var gradient = L2 * weight;
-    for (var chunk = 0u; chunk < CHUNKS; chunk++) {
-        gradient += d_weight_chunks_load(chunk * MLP_QUADS + index);
-    }
-    let updated = adam_update(Adam(weight, mlp_first[index], mlp_second[index]), gradient);
+    let updated = adam_update(Adam(mlp[index], mlp_first[index], mlp_second[index]), d_weights[index]);
     mlp[index] = updated.parameter;
     mlp_first[index] = updated.first;
     mlp_second[index] = updated.second;

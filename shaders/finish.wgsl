@@ -1,5 +1,5 @@
 // Ends a step: sums the errors of its rays and chooses the number of rays of the next one, so that the kept
-// samples meet their target and the marched ones fit. One workgroup. Needs: counters.
+// samples meet their target and the marched ones fit. One workgroup. Needs: counters, usable.
 
 var<storage, read_write> counters: Counters;
 var<storage, read_write> dispatch: array<vec3<u32>>;
@@ -27,8 +27,14 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     counters.sum_rays += rays;
     counters.sum_samples += counters.samples;
     counters.sum_kept += counters.kept;
-    counters.sum_loss += dot(total, vec4(0.25)) / used;
-    counters.sum_color_error += (total.x + total.y + total.z) / (3.0 * used);
+    if gradients_usable() {
+        counters.sum_loss += dot(total, vec4(0.25)) / used;
+        counters.sum_color_error += (total.x + total.y + total.z) / (3.0 * used);
+    } else {
+        counters.sum_skipped += 1u;
+    }
+    gradient_range[0] = 0u;
+    gradient_range[1] = 0u;
 
     let asked = f32(counters.rays);
     let fit_kept = f32(TARGET_KEPT) / max(f32(counters.kept_wanted), 1.0) * (used / asked);

@@ -1,5 +1,5 @@
 // The encoding's backward pass: adds each kept sample's gradient to the eight corners of its cells. One level
-// per row of workgroups. Needs: counters, grid, gradient.
+// per row of workgroups. Needs: counters, grid, gradient, usable.
 
 var<storage, read> counters: Counters;
 tensor<read> samples: vec4<f32>;
@@ -10,7 +10,7 @@ tensor<read> d_encoding: vec4<f32>;
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
-    if index >= counters.kept {
+    if index >= counters.kept || !gradients_usable() {
         return;
     }
     let rays = f32(counters.rays_used);

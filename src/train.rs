@@ -16,6 +16,9 @@ use crate::visibility;
 use anyhow::{Result, bail};
 use std::sync::Arc;
 
+/// The name under which a timer finds the updates of the occupancy grid.
+const OCCUPANCY: &str = "occupancy grid";
+
 /// Trains one field on one device.
 #[derive(Debug)]
 pub struct Trainer {
@@ -41,7 +44,9 @@ pub struct StepStats {
     pub marched: u64,
     /// Samples with colour and gradients of all of them.
     pub samples: u64,
-    /// Mean loss.
+    /// Steps whose gradients were not finite, or so large that their squares would not be: they changed nothing.
+    pub skipped: u32,
+    /// Mean loss of the other steps.
     pub loss: f64,
     /// Mean squared error of the colour.
     pub color_error: f64,
@@ -113,7 +118,7 @@ impl Trainer {
     /// When the device was lost or a kernel failed.
     pub fn warm_up(&mut self) -> Result<()> {
         self.step(0.0, None)?;
-        self.refresh_occupancy(true);
+        self.refresh_occupancy(true, None)?;
         self.gpu.wait()?;
         self.reset()
     }
@@ -162,6 +167,7 @@ impl Trainer {
         self.gpu.write(self.workspace.get("dispatch"), kernels::dispatch::RAYS, &groups);
         let mut encoder = self.gpu.encoder("restore");
         self.workspace.tensor("d_table").clear(&mut encoder);
+        encoder.clear_buffer(&self.workspace.get("gradient_range").raw, 0, None);
         self.gpu.submit(encoder);
         self.step = state.step;
         self.gpu.wait()
@@ -202,7 +208,7 @@ impl Trainer {
         let grid = &self.plan.config.occupancy;
         if self.step > 0 && self.step.is_multiple_of(grid.interval) {
             let all = self.step <= grid.warm_up;
-            self.refresh_occupancy(all);
+            self.refresh_occupancy(all, timer.as_deref_mut())?;
         }
         self.step += 1;
         let optimizer = &self.plan.config.optimizer;
@@ -217,7 +223,7 @@ impl Trainer {
         self.gpu.write(self.workspace.get("step"), 0, &[step]);
         self.gpu.run("step", &self.stages, timer.as_deref_mut());
         if let Some(timer) = timer {
-            timer.collect(&self.gpu)?;
+            timer.collect(&self.gpu, None)?;
         }
         self.gpu.check()
     }
@@ -226,6 +232,12 @@ impl Trainer {
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.step
+    }
+
+    /// The device it trains on.
+    #[must_use]
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
     }
 
     /// The plan it was built from.
@@ -249,14 +261,15 @@ impl Trainer {
         let counters = self.gpu.read::<Counters>(buffer, 0, 1)?[0];
         let sums = std::mem::offset_of!(Counters, sum_steps) / size_of::<u32>();
         self.gpu.write(buffer, sums, &vec![0u32; size_of::<Counters>() / size_of::<u32>() - sums]);
-        let steps = f64::from(counters.sum_steps.max(1));
+        let used = f64::from(counters.sum_steps.saturating_sub(counters.sum_skipped).max(1));
         Ok(StepStats {
             steps: counters.sum_steps,
             rays: u64::from(counters.sum_rays),
             marched: u64::from(counters.sum_samples),
             samples: u64::from(counters.sum_kept),
-            loss: f64::from(counters.sum_loss) / steps,
-            color_error: f64::from(counters.sum_color_error) / steps,
+            skipped: counters.sum_skipped,
+            loss: f64::from(counters.sum_loss) / used,
+            color_error: f64::from(counters.sum_color_error) / used,
         })
     }
 
@@ -266,7 +279,7 @@ impl Trainer {
     }
 
     /// Visits all cells, or every `stride`-th of them in turn.
-    fn refresh_occupancy(&mut self, all: bool) {
+    fn refresh_occupancy(&mut self, all: bool, mut timer: Option<&mut Timer>) -> Result<()> {
         let grid = &self.plan.config.occupancy;
         let stride = if all { 1 } else { grid.stride };
         let first = (self.step / grid.interval) % stride;
@@ -282,9 +295,13 @@ impl Trainer {
                 ..Step::default()
             };
             self.gpu.write(self.workspace.get("step"), 0, &[step]);
-            self.gpu.run("occupancy", self.occupancy.chunk(count as usize), None);
+            self.gpu.run(OCCUPANCY, self.occupancy.chunk(count as usize), timer.as_deref_mut());
+            if let Some(timer) = timer.as_deref_mut() {
+                timer.collect(&self.gpu, Some(OCCUPANCY))?;
+            }
         }
-        self.gpu.run("occupancy bits", self.occupancy.bits(), None);
+        self.gpu.run(OCCUPANCY, self.occupancy.bits(), timer.as_deref_mut());
+        timer.map_or(Ok(()), |timer| timer.collect(&self.gpu, Some(OCCUPANCY)))
     }
 }
 

@@ -16,7 +16,10 @@ struct Counters {
     sum_rays: u32,
     sum_samples: u32,
     sum_kept: u32,
-    // Of the loss (mean over rays and channels) and of the colour's squared error (mean over 3 channels).
+    // Steps whose gradients could not be used, and which changed nothing.
+    sum_skipped: u32,
+    // Of the loss (mean over rays and channels) and of the colour's squared error (mean over 3 channels) of the
+    // other steps.
     sum_loss: f32,
     sum_color_error: f32,
 }

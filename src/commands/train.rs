@@ -4,6 +4,7 @@ mod course;
 mod folder;
 mod log;
 mod setup;
+mod stages;
 
 use super::scores::{Judge, Means};
 use super::{Session, writable_folder};
@@ -56,6 +57,8 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         "event": "start",
         "step": setup.about.step,
         "adapter": setup.about.adapter,
+        "driver": format!("{} {}", gpu.info.driver, gpu.info.driver_info),
+        "left_out": setup.left_out(&dataset),
         "load_seconds": load_seconds,
         "compile_seconds": compile_seconds,
     }))?;
@@ -103,9 +106,16 @@ fn finish(
         "steps": end.step,
         "seconds": end.seconds,
         "loss": end.loss,
+        "skipped": end.skipped,
         "interrupted": end.interrupted,
     });
     let mut text = format!("{} steps in {}, saved to {folder}", end.step, duration(end.seconds));
+    if end.skipped > 0 {
+        text += &format!(
+            "; {} steps were skipped, their gradients were not finite or far too large",
+            end.skipped
+        );
+    }
     if end.interrupted {
         text = format!("interrupted after {text}; go on with --resume");
         return session.print(&result, &text);

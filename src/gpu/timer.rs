@@ -72,11 +72,11 @@ impl Timer {
         }
     }
 
-    /// Waits for the submission and adds its stages to the sums.
+    /// Waits for the submission and adds its stages to the sums, all under the name `group` if one is given.
     ///
     /// # Errors
     /// When the device was lost.
-    pub fn collect(&mut self, gpu: &Gpu) -> Result<()> {
+    pub fn collect(&mut self, gpu: &Gpu, group: Option<&str>) -> Result<()> {
         let count = self.labels.len();
         if count == 0 {
             return Ok(());
@@ -90,7 +90,7 @@ impl Timer {
         self.staging.unmap();
         for (label, pair) in self.labels.drain(..).zip(ticks.chunks_exact(2)) {
             let seconds = pair[1].saturating_sub(pair[0]) as f64 * self.period_ns * 1e-9;
-            *self.totals.entry(label).or_default() += seconds;
+            *self.totals.entry(group.map_or(label, str::to_owned)).or_default() += seconds;
         }
         Ok(())
     }

@@ -49,9 +49,11 @@ gpu_struct! {
         sum_samples: u32,
         /// Kept samples since then.
         sum_kept: u32,
-        /// Sum of the steps' losses.
+        /// Steps since then whose gradients could not be used, and which changed nothing.
+        sum_skipped: u32,
+        /// Sum of the other steps' losses.
         sum_loss: f32,
-        /// Sum of the steps' mean squared colour errors.
+        /// Sum of their mean squared colour errors.
         sum_color_error: f32,
     }
 }

@@ -60,9 +60,10 @@ pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()>
     let ordered = plan.accumulation == Accumulation::Ordered;
     let memory = if ordered { plan.memory } else { Memory::Buffers };
     workspace.add_tensor(gpu.tensor("d_table", Element::Vec2, layout.entries, memory)?);
-    for name in ["mlp_first", "mlp_second"] {
+    for name in ["mlp_first", "mlp_second", "d_weights"] {
         workspace.add(gpu.storage::<[f32; 4]>(name, layout.quads)?);
     }
+    workspace.add(gpu.storage::<u32>("gradient_range", 2)?);
     Ok(())
 }
 
@@ -196,22 +197,27 @@ fn weight_kernel(gpu: &Gpu, plan: &Plan, outputs: usize) -> Result<Kernel> {
     plan.generated_kernel(gpu, &format!("d weights {outputs}"), &parts, &[], text)
 }
 
-/// Scatters into the table, updates all parameters and ends the step.
+/// Finds out whether the gradients can be used, scatters into the table, updates all parameters and ends the
+/// step. A step whose gradients cannot be used changes nothing and is counted.
 ///
 /// # Errors
 /// When a kernel cannot be built.
 pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    const USABLE: Part = part!("common/usable.wgsl");
+    const MAGNITUDE: Part = part!("common/magnitude.wgsl");
     let [add, take] = plan.gradient();
-    let mut parts = vec![COUNTERS, GRID, add];
+    let mut parts = vec![COUNTERS, GRID, USABLE, add];
     if plan.accumulation != Accumulation::Ordered {
         parts.push(part!("scatter.wgsl"));
     }
-    let scatter = plan.kernel(gpu, "scatter", &parts)?;
-    let table = plan.kernel(gpu, "adam table", &[STEP, COUNTERS, ADAM, take, part!("adam_table.wgsl")])?;
-    let mlp = plan.kernel(gpu, "adam mlp", &[STEP, ADAM, part!("adam_mlp.wgsl")])?;
-    let finish = plan.kernel(gpu, "finish", &[COUNTERS, part!("finish.wgsl")])?;
+    let bind = |label: &str, parts: &[Part]| workspace.bind(gpu, &plan.kernel(gpu, label, parts)?, &[]);
+    let range = bind("gradient range", &[COUNTERS, MAGNITUDE, part!("gradient_range.wgsl")])?;
+    let sums = bind("weight sums", &[MAGNITUDE, part!("weight_sums.wgsl")])?;
+    let scatter = bind("scatter", &parts)?;
+    let table = bind("adam table", &[STEP, COUNTERS, ADAM, take, part!("adam_table.wgsl")])?;
+    let mlp = bind("adam mlp", &[STEP, ADAM, USABLE, part!("adam_mlp.wgsl")])?;
+    let finish = bind("finish", &[COUNTERS, USABLE, part!("finish.wgsl")])?;
     let sizes = workspace.get("dispatch");
-    let scatter = workspace.bind(gpu, &scatter, &[])?;
     let scatter = match plan.accumulation {
         Accumulation::Ordered => Stage::fixed(scatter, plan.layout.levels.len() / 8, 1),
         _ => Stage::indirect(scatter, sizes, dispatch::KEPT),
@@ -219,10 +225,12 @@ pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage
     let groups = plan.layout.entries.div_ceil(128);
     let columns = groups.min(1 << 15);
     Ok(vec![
+        Stage::indirect(range, sizes, dispatch::KEPT),
+        Stage::fixed(sums, plan.layout.quads.div_ceil(8), 1),
         scatter,
-        Stage::fixed(workspace.bind(gpu, &table, &[])?, columns, groups.div_ceil(columns)),
-        Stage::fixed(workspace.bind(gpu, &mlp, &[])?, plan.layout.quads.div_ceil(8), 1),
-        Stage::fixed(workspace.bind(gpu, &finish, &[])?, 1, 1),
+        Stage::fixed(table, columns, groups.div_ceil(columns)),
+        Stage::fixed(mlp, plan.layout.quads.div_ceil(8), 1),
+        Stage::fixed(finish, 1, 1),
     ])
 }
 

@@ -117,6 +117,7 @@ fn networks_agree_with_the_reference() {
         }
         begin(&bench, step, learning_rate);
         bench.write("d_weight_chunks", &chunks);
+        bench.run_only(&stages, "weight sums");
         bench.run_only(&stages, "adam mlp");
         adam.update(Schedule { step, learning_rate }, &mut moments, &mut want, &gradient);
     }
@@ -137,6 +138,7 @@ fn nothing_to_divide_by() {
     let start: Vec<f32> = (0..quads * 4).map(|i| if i % 2 == 0 { 0.0 } else { 1.0 }).collect();
     bench.write("mlp", &start);
     begin(&bench, 1, 0.25);
+    bench.run_only(&stages, "weight sums");
     bench.run_only(&stages, "adam mlp");
     let got: Vec<f32> = bench.read("mlp", quads * 4);
     let want: Vec<f64> = start.iter().map(|&w| if w == 0.0 { 0.0 } else { 0.75 }).collect();

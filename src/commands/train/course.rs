@@ -1,6 +1,7 @@
 //! The course of a training: blocks of steps, and between them reports, measurements and checkpoints.
 
 use super::log::Log;
+use super::stages::StageTimes;
 use crate::commands::scores::{Judge, Means};
 use crate::progress::{Progress, duration, short};
 use crate::remarks::Remarks;
@@ -17,6 +18,8 @@ use std::time::Instant;
 
 /// Steps between reports, each of which waits for the device.
 const BLOCK: u32 = 16;
+/// A training ends when so many steps in a row had gradients that could not be used.
+const MOST_SKIPPED: u32 = 16;
 /// Seconds of training between checkpoints.
 const BETWEEN_CHECKPOINTS: f64 = 60.0;
 
@@ -37,6 +40,9 @@ pub(super) struct Course<'a> {
     saved: (u32, f64),
     loss: Option<f64>,
     is_empty: bool,
+    /// Skipped steps, and how many of them came last.
+    skipped: (u32, u32),
+    stages: StageTimes,
 }
 
 /// Measures a few test views every so many steps.
@@ -59,6 +65,8 @@ pub(super) struct End {
     pub(super) seconds: f64,
     /// The last loss; `None` when no step was taken.
     pub(super) loss: Option<f64>,
+    /// Steps of this run whose gradients could not be used.
+    pub(super) skipped: u32,
     /// Whether it was asked to stop before its end.
     pub(super) interrupted: bool,
 }
@@ -73,6 +81,7 @@ impl<'a> Course<'a> {
         remarks: Remarks,
     ) -> Self {
         let (seconds, saved) = (about.seconds, (about.step, about.seconds));
+        let stages = StageTimes::new(trainer.gpu());
         Self {
             about,
             trainer,
@@ -84,6 +93,8 @@ impl<'a> Course<'a> {
             saved,
             loss: None,
             is_empty: false,
+            skipped: (0, 0),
+            stages,
         }
     }
 
@@ -107,8 +118,11 @@ impl<'a> Course<'a> {
         }
         self.save()?;
         let step = self.trainer.steps();
+        if let Some(row) = self.stages.row(step) {
+            self.log.write(&row)?;
+        }
         let interrupted = !budget.is_spent(step, self.seconds);
-        Ok(End { step, seconds: self.seconds, loss: self.loss, interrupted })
+        Ok(End { step, seconds: self.seconds, loss: self.loss, skipped: self.skipped.0, interrupted })
     }
 
     /// Takes up to [`BLOCK`] steps and waits for them.
@@ -119,23 +133,39 @@ impl<'a> Course<'a> {
         if let Some(every) = self.exam.as_ref().and_then(|exam| exam.every) {
             count = count.min(every - first % every);
         }
+        let mut stages = self.stages.of_block(first / BLOCK);
         let clock = Instant::now();
         for step in first..first + count {
             let seconds = self.seconds + clock.elapsed().as_secs_f64();
-            self.trainer.step(budget.learning_rate(optimizer, step, seconds), None)?;
+            let timer = stages.as_mut().and_then(|stages| stages.of_step());
+            self.trainer.step(budget.learning_rate(optimizer, step, seconds), timer)?;
         }
         let stats = self.trainer.report()?;
         self.seconds += clock.elapsed().as_secs_f64();
-        if !(stats.loss.is_finite() && stats.color_error.is_finite()) {
-            bail!(
-                "the loss is not finite any more ({}) before step {}: the training diverged; start again with a \
-                 smaller optimizer.learning_rate; {}",
-                stats.loss,
-                self.trainer.steps(),
-                self.kept()
-            );
-        }
+        self.check(&stats)?;
         Ok(stats)
+    }
+
+    /// Ends a training that leads nowhere any more.
+    fn check(&mut self, stats: &StepStats) -> Result<()> {
+        let in_a_row = if stats.skipped == stats.steps { self.skipped.1 + stats.skipped } else { 0 };
+        self.skipped = (self.skipped.0 + stats.skipped, in_a_row);
+        let found = match stats.loss {
+            _ if in_a_row >= MOST_SKIPPED => {
+                format!("the gradients of the last {in_a_row} steps were not finite or far too large")
+            }
+            loss if !(loss.is_finite() && stats.color_error.is_finite()) => {
+                format!("the loss is not finite any more ({loss})")
+            }
+            _ => return Ok(()),
+        };
+        bail!(
+            "{found} at step {}: the training diverged; start again with a smaller optimizer.learning_rate ({} was \
+             used); {}",
+            self.trainer.steps(),
+            self.about.config.optimizer.learning_rate,
+            self.kept()
+        )
     }
 
     /// Logs a block and shows how far the training is.
@@ -150,6 +180,13 @@ impl<'a> Course<'a> {
             ));
         }
         self.is_empty = stats.samples == 0;
+        if stats.skipped > 0 && self.skipped.0 == stats.skipped {
+            progress.say(&format!(
+                "warning: up to step {step}, {} steps were skipped: their gradients were not finite or far too large; \
+                 if it goes on, try a smaller optimizer.learning_rate",
+                stats.skipped
+            ));
+        }
         self.log.write(&json!({
             "step": step,
             "seconds": seconds,
@@ -158,6 +195,7 @@ impl<'a> Course<'a> {
             "rays": stats.rays,
             "samples": stats.samples,
             "marched": stats.marched,
+            "skipped": stats.skipped,
             "learning_rate": budget.learning_rate(&self.about.config.optimizer, step, seconds),
         }))?;
         let spent = budget.spent(step, seconds);

@@ -91,7 +91,8 @@ impl Setup {
         remarks.say(&format!("left out: {}", self.left_out(dataset).join(", ")));
     }
 
-    fn left_out(&self, dataset: &Dataset) -> Vec<&'static str> {
+    /// The parts that the scene does not need.
+    pub(super) fn left_out(&self, dataset: &Dataset) -> Vec<&'static str> {
         let needs = &self.plan.needs;
         let parts = [
             (!needs.lens, "lens model (all cameras are pinholes)"),
