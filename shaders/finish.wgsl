@@ -35,6 +35,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     }
     gradient_range[0] = 0u;
     gradient_range[1] = 0u;
+    gradient_range[2] = 0u;
 
     let asked = f32(counters.rays);
     let fit_kept = f32(TARGET_KEPT) / max(f32(counters.kept_wanted), 1.0) * (used / asked);

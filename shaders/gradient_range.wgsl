@@ -1,15 +1,23 @@
-// The largest gradient of the encoding, before any of them is used. Needs: counters, magnitude.
+// The largest gradient of the encoding and the largest squared error, before any gradient is used.
+// Needs: counters, magnitude.
 
 var<storage, read> counters: Counters;
 // Two levels in each.
 tensor<read> d_encoding: vec4<f32>;
+var<storage, read> ray_errors: array<vec4<f32>>;
 var<storage, read_write> gradient_range: array<atomic<u32>>;
-var<workgroup> most: atomic<u32>;
+var<workgroup> most_gradient: atomic<u32>;
+var<workgroup> most_error: atomic<u32>;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+fn main(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+    @builtin(num_workgroups) groups: vec3<u32>,
+) {
     if thread == 0u {
-        atomicStore(&most, 0u);
+        atomicStore(&most_gradient, 0u);
+        atomicStore(&most_error, 0u);
     }
     workgroupBarrier();
     if id.x < counters.kept {
@@ -17,10 +25,14 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
         for (var i = 0u; i < LEVELS / 2u; i++) {
             own = max(own, magnitude_bits(d_encoding_load(id.x * (LEVELS / 2u) + i)));
         }
-        atomicMax(&most, own);
+        atomicMax(&most_gradient, own);
+    }
+    for (var ray = id.x; ray < counters.rays_used; ray += groups.x * 64u) {
+        atomicMax(&most_error, magnitude_bits(ray_errors[ray]));
     }
     workgroupBarrier();
     if thread == 0u {
-        atomicMax(&gradient_range[0], atomicLoad(&most));
+        atomicMax(&gradient_range[0], atomicLoad(&most_gradient));
+        atomicMax(&gradient_range[2], atomicLoad(&most_error));
     }
 }

@@ -63,7 +63,7 @@ pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()>
     for name in ["mlp_first", "mlp_second", "d_weights"] {
         workspace.add(gpu.storage::<[f32; 4]>(name, layout.quads)?);
     }
-    workspace.add(gpu.storage::<u32>("gradient_range", 2)?);
+    workspace.add(gpu.storage::<u32>("gradient_range", 3)?);
     Ok(())
 }
 
