@@ -58,6 +58,7 @@
 //! ```
 
 pub mod camera;
+pub mod check;
 pub mod checkpoint;
 pub mod config;
 pub mod dataset;

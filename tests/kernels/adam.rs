@@ -65,7 +65,7 @@ fn gradients(random: &mut Random, count: usize, fixed: bool) -> Vec<f32> {
 #[test]
 fn table_agrees_with_the_reference() {
     for accumulation in [Accumulation::Auto, Accumulation::Exchange, Accumulation::Fixed] {
-        let bench = setup().accumulation(accumulation).bench();
+        let bench = Bench::new(&setup().accumulation(accumulation));
         let int64 = wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS;
         if accumulation == Accumulation::Fixed && !bench.gpu.has(int64) {
             println!("'{}' has no 64-bit atomics", bench.gpu.info.name);
@@ -100,7 +100,7 @@ fn table_agrees_with_the_reference() {
 
 #[test]
 fn networks_agree_with_the_reference() {
-    let bench = setup().network(32, 2).bench();
+    let bench = Bench::new(&setup().network(32, 2));
     let stages = stages(&bench);
     let mut random = Random::new(71);
     bench.randomise(&mut random, 1.0, 1.0);
@@ -132,7 +132,7 @@ fn networks_agree_with_the_reference() {
 /// No gradient at all: the second moment is 0 and so is the step. With L2 alone the weights shrink.
 #[test]
 fn nothing_to_divide_by() {
-    let bench = setup().bench();
+    let bench = Bench::new(&setup());
     let stages = stages(&bench);
     let quads = bench.plan.layout.quads;
     let start: Vec<f32> = (0..quads * 4).map(|i| if i % 2 == 0 { 0.0 } else { 1.0 }).collect();

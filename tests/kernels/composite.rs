@@ -20,7 +20,7 @@ fn bench(convention: Transmittance) -> (Bench, Stage) {
     let mut setup = Setup::tiny().transmittance(convention);
     setup.config.batch.kept = 8192;
     setup.config.batch.samples = 16384;
-    let bench = setup.bench();
+    let bench = Bench::new(&setup);
     let stage = training::composite(&bench.gpu, &bench.plan, &bench.workspace, true).expect("composite");
     (bench, stage)
 }

@@ -13,7 +13,7 @@ use crate::close::{assert_close, largest};
 
 /// A density network that hands 16 features through: each as the difference of its two rectified halves.
 fn transparent(setup: Setup) -> Bench {
-    let bench = setup.network(32, 1).bench();
+    let bench = Bench::new(&setup.network(32, 1));
     let mut weights = bench.weights("mlp");
     for feature in 0..DENSITY_OUTPUTS {
         for (half, sign) in [(0, 1.0), (1, -1.0)] {
@@ -156,7 +156,7 @@ fn crowd(random: &mut Random) -> Vec<TrainingRay> {
 #[test]
 fn collisions_sum_up() {
     for accumulation in accumulations(&open()) {
-        let bench = Setup::tiny().accumulation(accumulation).bench();
+        let bench = Bench::new(&Setup::tiny().accumulation(accumulation));
         let mut random = Random::new(12);
         bench.randomise(&mut random, 1.0, 1.0);
         let stages = bench.stages();
@@ -180,7 +180,7 @@ fn sums_are_the_same_every_time() {
         if !matches!(accumulation, Accumulation::Fixed | Accumulation::Ordered) {
             continue;
         }
-        let bench = Setup::tiny().accumulation(accumulation).bench();
+        let bench = Bench::new(&Setup::tiny().accumulation(accumulation));
         let mut random = Random::new(13);
         bench.randomise(&mut random, 1.0, 1.0);
         let stages = bench.stages();

@@ -3,7 +3,7 @@
 use nerf::kernels::Part;
 use nerf::reference::composite;
 
-use crate::bench::Setup;
+use crate::bench::{Bench, Setup};
 
 const EXP: Part = ("common/exp.wgsl", include_str!("../../shaders/common/exp.wgsl"));
 
@@ -12,7 +12,7 @@ const BOUND: f64 = 2e-7;
 
 /// `expression` of `x` (and of `y`) for all inputs.
 fn evaluate(expression: &str, inputs: &[[f32; 2]]) -> Vec<f32> {
-    let mut bench = Setup::tiny().bench();
+    let mut bench = Bench::new(&Setup::tiny());
     let text = format!(
         "var<storage, read> test_inputs: array<vec2<f32>>;\n\
          var<storage, read_write> test_outputs: array<f32>;\n\
@@ -27,8 +27,8 @@ fn evaluate(expression: &str, inputs: &[[f32; 2]]) -> Vec<f32> {
     // Buffers are multiples of 16 bytes.
     let mut padded = inputs.to_vec();
     padded.resize(inputs.len().next_multiple_of(4), [1.0; 2]);
-    bench.workspace.add(bench.gpu.storage_with("test_inputs", &padded).expect("inputs"));
-    bench.workspace.add(bench.gpu.storage::<f32>("test_outputs", padded.len()).expect("outputs"));
+    bench.0.workspace.add(bench.0.gpu.storage_with("test_inputs", &padded).expect("inputs"));
+    bench.0.workspace.add(bench.0.gpu.storage::<f32>("test_outputs", padded.len()).expect("outputs"));
     let kernel = bench.plan.generated_kernel(&bench.gpu, "test", &[EXP], &[], text).expect("a kernel");
     let bound = bench.workspace.bind(&bench.gpu, &kernel, &[]).expect("bindings");
     bench.run([&nerf::gpu::pass::Stage::fixed(bound, padded.len().div_ceil(64), 1)]);

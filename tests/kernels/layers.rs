@@ -66,7 +66,7 @@ fn networks_of_all_shapes() {
     ] {
         let product = rows.map(|rows| Product { rows, shared_weights: false });
         let setup = Setup { product, ..Setup::tiny().network(width, color_layers) };
-        let bench = setup.hdr(hdr).bench();
+        let bench = Bench::new(&setup.hdr(hdr));
         bench.randomise(&mut random, 1.0, 1.0);
         let stages = bench.stages();
         for (rays, samples) in [(3, 0), (1, 1), (2, 3), (9, 65), (33, 130)] {
@@ -82,7 +82,7 @@ fn networks_of_all_shapes() {
 fn sixteen_levels() {
     let mut setup = Setup::tiny().network(32, 2);
     setup.config.grid.levels = 16;
-    let bench = setup.bench();
+    let bench = Bench::new(&setup);
     let mut random = Random::new(21);
     bench.randomise(&mut random, 1.0, 1.0);
     check("16 levels", &bench, &bench.stages(), &random_batch(&mut random, 9, 65), 1.0);
@@ -92,7 +92,7 @@ fn sixteen_levels() {
 #[test]
 fn tensors_in_buffers() {
     let setup = Setup { memory: Some(Memory::Buffers), ..Setup::tiny().network(32, 2) };
-    let bench = setup.bench();
+    let bench = Bench::new(&setup);
     let mut random = Random::new(23);
     bench.randomise(&mut random, 1.0, 1.0);
     check("buffers", &bench, &bench.stages(), &random_batch(&mut random, 33, 130), 1.0);
@@ -103,7 +103,7 @@ fn tensors_in_buffers() {
 fn saturated_activations() {
     let mut random = Random::new(22);
     for hdr in [false, true] {
-        let bench = Setup::tiny().network(32, 2).hdr(hdr).bench();
+        let bench = Bench::new(&Setup::tiny().network(32, 2).hdr(hdr));
         bench.randomise(&mut random, 1.0, 1.0);
         let mut weights = bench.weights("mlp");
         weights[1][..32].iter_mut().for_each(|weight| *weight *= 64.0);

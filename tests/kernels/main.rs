@@ -7,7 +7,6 @@ mod adam;
 mod bench;
 mod close;
 mod composite;
-mod draw;
 mod encode;
 mod exponential;
 mod layers;

@@ -36,10 +36,10 @@ fn rays(random: &mut Random) -> Vec<BoxRay> {
 /// One camera of one pixel per ray, of which the kernel draws some.
 fn bench(mut setup: Setup, rays: &[BoxRay]) -> Bench {
     setup.needs.cameras = rays.len();
-    let mut bench = setup.bench();
+    let mut bench = Bench::new(&setup);
     let cameras: Vec<_> = rays.iter().map(|ray| pixel_camera(ray.origin, ray.direction)).collect();
-    bench.workspace.add(bench.gpu.storage_with("cameras", &cameras).expect("cameras"));
-    bench.workspace.add(bench.gpu.storage::<u32>("pixels", 1).expect("pixels"));
+    bench.0.workspace.add(bench.0.gpu.storage_with("cameras", &cameras).expect("cameras"));
+    bench.0.workspace.add(bench.0.gpu.storage::<u32>("pixels", 1).expect("pixels"));
     bench
 }
 

@@ -30,7 +30,7 @@ fn values_and_bits_agree_with_the_reference() {
         setup.config.batch.samples = 1000;
         setup.config.occupancy.threshold = limit;
         setup.config.occupancy.decay = 0.9;
-        let bench = setup.bench();
+        let bench = Bench::new(&setup);
         bench.randomise(&mut random, 1.0, 2.0);
         let cells = bench.plan.cell_count();
         let first: Vec<f32> = (0..cells)
@@ -84,7 +84,7 @@ fn values_and_bits_agree_with_the_reference() {
 /// A grid of which no camera sees anything is empty, and its mean is a number.
 #[test]
 fn nothing_is_seen() {
-    let bench = Setup::tiny().bench();
+    let bench = Bench::new(&Setup::tiny());
     let cells = bench.plan.cell_count();
     bench.write("occupancy", &vec![-1.0_f32; cells]);
     bench.write("occupancy_bits", &vec![u32::MAX; cells / 32]);

@@ -11,7 +11,7 @@ const RANDOM: Part = ("common/random.wgsl", include_str!("../../shaders/common/r
 const COUNT: usize = 4096;
 
 fn evaluate<T: bytemuck::Pod>(kind: &str, expression: &str) -> Vec<T> {
-    let mut bench: Bench = Setup::tiny().bench();
+    let mut bench: Bench = Bench::new(&Setup::tiny());
     let text = format!(
         "var<storage, read_write> test_outputs: array<{kind}>;\n\
          @compute @workgroup_size(64)\n\
@@ -21,7 +21,7 @@ fn evaluate<T: bytemuck::Pod>(kind: &str, expression: &str) -> Vec<T> {
          }}\n",
         pcg(STEP.wrapping_add(pcg(SEED)))
     );
-    bench.workspace.add(bench.gpu.storage::<T>("test_outputs", COUNT).expect("outputs"));
+    bench.0.workspace.add(bench.0.gpu.storage::<T>("test_outputs", COUNT).expect("outputs"));
     let kernel = bench.plan.generated_kernel(&bench.gpu, "test", &[RANDOM], &[], text).expect("a kernel");
     let bound = bench.workspace.bind(&bench.gpu, &kernel, &[]).expect("bindings");
     bench.run([&Stage::fixed(bound, COUNT / 64, 1)]);

@@ -91,8 +91,8 @@ fn every_pixel_of_every_lens() {
         setup.needs.lens = lens != Lens::Pinhole;
         let (width, height) = (17, 13);
         setup.config.batch.rays = 256;
-        let mut bench = setup.bench();
-        viewing::allocate(&bench.gpu, &bench.plan, &mut bench.workspace).expect("a view");
+        let mut bench = Bench::new(&setup);
+        viewing::allocate(&bench.0.gpu, &bench.0.plan, &mut bench.0.workspace).expect("a view");
         let stage = viewing::rays(&bench.gpu, &bench.plan, &bench.workspace).expect("view rays");
         let camera = camera(&mut random, width, height, lens);
         bench.write("cameras", &[kernels::Camera::in_box(&camera, &bounds(), 0)]);
@@ -141,8 +141,8 @@ fn every_pixel_of_every_lens() {
 /// Rays along the axes, from inside, from outside, and past the box.
 #[test]
 fn rays_along_the_axes() {
-    let mut bench = Setup::tiny().bench();
-    viewing::allocate(&bench.gpu, &bench.plan, &mut bench.workspace).expect("a view");
+    let mut bench = Bench::new(&Setup::tiny());
+    viewing::allocate(&bench.0.gpu, &bench.0.plan, &mut bench.0.workspace).expect("a view");
     let stage = viewing::rays(&bench.gpu, &bench.plan, &bench.workspace).expect("view rays");
     let near = bench.plan.config.march.near;
     for (origin, back, want) in [
@@ -203,7 +203,7 @@ fn targets_of_mixed_images() {
             setup.config.background = background;
             setup.needs.lens = true;
             setup.needs.cameras = sizes.len();
-            let mut bench = setup.bench();
+            let mut bench = Bench::new(&setup);
             let cameras = sizes.map(|(width, height)| camera(&mut random, width, height, lens));
             let mut first = 0;
             let on_device: Vec<_> = (cameras.iter())
@@ -218,12 +218,12 @@ fn targets_of_mixed_images() {
             let pixels: Vec<[f64; 4]> = if hdr {
                 let data: Vec<[f32; 4]> =
                     (0..texels).map(|_| std::array::from_fn(|_| random.number(0.0, 1.0) as f32)).collect();
-                bench.workspace.add(bench.gpu.storage_with("pixels", &data).expect("pixels"));
+                bench.0.workspace.add(bench.0.gpu.storage_with("pixels", &data).expect("pixels"));
                 data.iter().map(|pixel| pixel.map(f64::from)).collect()
             } else {
                 let data: Vec<[u8; 4]> =
                     (0..texels).map(|_| std::array::from_fn(|_| random.number(0.0, 256.0) as u8)).collect();
-                bench.workspace.add(bench.gpu.storage_with("pixels", &data).expect("pixels"));
+                bench.0.workspace.add(bench.0.gpu.storage_with("pixels", &data).expect("pixels"));
                 let premultiplied = |&[r, g, b, a]: &[u8; 4]| {
                     let alpha = f64::from(a) / 255.0;
                     let [r, g, b] = [r, g, b].map(|x| f64::from(x) / 255.0 * alpha);
@@ -231,7 +231,7 @@ fn targets_of_mixed_images() {
                 };
                 data.iter().map(premultiplied).collect()
             };
-            bench.workspace.add(bench.gpu.storage_with("cameras", &on_device).expect("cameras"));
+            bench.0.workspace.add(bench.0.gpu.storage_with("cameras", &on_device).expect("cameras"));
             let stage = training::rays(&bench.gpu, &bench.plan, &bench.workspace).expect("rays");
             for count in [1, 3, 65, 130] {
                 bench.set_rays(count);

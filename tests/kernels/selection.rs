@@ -101,7 +101,7 @@ fn check(bench: &Bench, rays: &[TrainingRay], raw: &[f32]) {
 
 #[test]
 fn chosen_samples_agree_with_the_reference() {
-    let bench = setup().bench();
+    let bench = Bench::new(&setup());
     let mut random = Random::new(30);
     for (rays, samples) in [(3, 0), (1, 1), (2, 3), (9, 65), (33, 130), (200, 250)] {
         let (rays, raw) = batch(&mut random, rays, samples);
@@ -114,7 +114,7 @@ fn chosen_samples_agree_with_the_reference() {
 fn rays_end_where_they_are_opaque() {
     let mut setup = setup();
     setup.config.selection.keep_probability = 1.0;
-    let bench = setup.bench();
+    let bench = Bench::new(&setup);
     let mut random = Random::new(33);
     let rays = random_batch(&mut random, 60, 380);
     check(&bench, &rays, &random.numbers(380, 2.0, 3.0));
@@ -129,7 +129,7 @@ fn probability_at_its_ends() {
         setup.config.selection.keep_probability = probability;
         setup.config.selection.weight_floor = 1.0;
         setup.config.selection.stop_transmittance = 0.0;
-        let bench = setup.bench();
+        let bench = Bench::new(&setup);
         let mut random = Random::new(31);
         let (rays, mut raw) = batch(&mut random, 33, 130);
         raw.iter_mut().for_each(|raw| *raw = raw.min(0.0));
@@ -144,7 +144,7 @@ fn too_many_kept_samples() {
     let mut setup = Setup::tiny();
     setup.config.march.most_steps = 32;
     setup.config.batch.kept = 60;
-    let bench = setup.bench();
+    let bench = Bench::new(&setup);
     let capacity = marching::kept_capacity(&bench.plan);
     let mut random = Random::new(32);
     for (rays, samples) in [(33, 130), (2, 130), (130, capacity), (150, 260)] {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use nerf::camera::{Camera, Lens};
+use nerf::check::Workbench;
 use nerf::config::{Background, Optimizer, Selection};
 use nerf::dataset::Bounds;
 use nerf::image::{Image, Pixels};
@@ -73,10 +74,10 @@ impl Tiny {
         let cascades = setup.needs.cascades;
         let bounds = Bounds { center: DVec3::splat(0.5), half: 0.5, cascades, source: String::new() };
         let gpu = Arc::new(open());
-        let plan = setup.plan(&gpu);
+        let plan = setup.plan(&gpu).expect("a valid configuration");
         let views = Views { cameras: &cameras, images: &images, bounds: &bounds };
         let trainer = Trainer::new(&gpu, plan.clone(), &views).expect("a trainer");
-        let bench = Bench { gpu, plan, workspace: trainer.workspace().clone() };
+        let bench = Bench(Workbench { gpu, plan, workspace: trainer.workspace().clone() });
         Self { trainer, bench }
     }
 

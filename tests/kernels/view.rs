@@ -8,7 +8,7 @@ use nerf::reference::march::{BoxRay, March};
 use nerf::reference::occupancy::OccupancyShape;
 use nerf::render::Renderer;
 
-use crate::bench::{Random, Setup};
+use crate::bench::{Bench, Random, Setup};
 use crate::close::assert_close;
 
 #[test]
@@ -20,7 +20,7 @@ fn pixels_agree_with_the_reference() {
         let mut setup = Setup::tiny().network(32, 2).hdr(hdr);
         setup.needs.cascades = cascades;
         setup.config.selection.stop_transmittance = 1e-4;
-        let bench = setup.bench();
+        let bench = Bench::new(&setup);
         bench.randomise(&mut random, 2.0, 1.5);
         bench.write("occupancy_bits", &vec![u32::MAX; bench.plan.cell_count() / 32]);
         let bounds =

@@ -1,61 +1,76 @@
-//! What the tests draw at random, and the numbers that the kernels draw.
+//! What the checks draw at random, and the numbers that the kernels draw.
 
+use crate::kernels::Step;
+use crate::reference::model::{RaySample, TrainingRay};
+use crate::reference::random;
 use glam::DVec3;
-use nerf::kernels::Step;
-use nerf::reference::model::{RaySample, TrainingRay};
-use nerf::reference::random;
 
 /// Dimensions of the random numbers, as the kernels draw them.
-pub(crate) mod dimension {
-    pub(crate) const IMAGE: u32 = 0;
-    pub(crate) const PIXEL: u32 = 1;
-    pub(crate) const OFFSET: u32 = 2;
-    pub(crate) const SELECTION: u32 = 3;
-    pub(crate) const BACKGROUND: u32 = 4;
-    pub(crate) const CELL: u32 = 8;
+pub mod dimension {
+    /// The view of a training ray.
+    pub const IMAGE: u32 = 0;
+    /// Its pixel.
+    pub const PIXEL: u32 = 1;
+    /// Where its first sample lies.
+    pub const OFFSET: u32 = 2;
+    /// Which of its samples are kept.
+    pub const SELECTION: u32 = 3;
+    /// Red, green and blue of its background, in this dimension and the next two.
+    pub const BACKGROUND: u32 = 4;
+    /// Position in a cell of the occupancy grid, in this dimension and the next two.
+    pub const CELL: u32 = 8;
 }
 
-/// Seed and step of the random numbers in every test.
-pub(crate) const SEED: u32 = 5;
-pub(crate) const STEP: u32 = 3;
+/// Seed of the kernels' random numbers in every check.
+pub const SEED: u32 = 5;
+/// Step of the kernels' random numbers in every check.
+pub const STEP: u32 = 3;
 
 /// The kernels' random number of `index`, uniform in [0, 1).
-pub(crate) fn uniform(index: usize, dimension: u32) -> f64 {
+#[must_use]
+pub fn uniform(index: usize, dimension: u32) -> f64 {
     f64::from(random::uniform(random::random_u32(SEED, STEP, index as u32, dimension)))
 }
 
 /// The step that goes with [`uniform`]; Adam's corrections are 1 and nothing is learnt.
-pub(crate) fn quiet_step() -> Step {
+#[must_use]
+pub fn quiet_step() -> Step {
     let stream = random::pcg(STEP.wrapping_add(random::pcg(SEED)));
     Step { stream, first_correction: 1.0, second_correction: 1.0, ..Step::default() }
 }
 
 /// Reproducible numbers that f32 holds exactly.
-pub(crate) struct Random {
+#[derive(Clone, Debug)]
+pub struct Random {
     next: u32,
 }
 
 impl Random {
-    pub(crate) fn new(seed: u32) -> Self {
+    /// The sequence of `seed`.
+    #[must_use]
+    pub fn new(seed: u32) -> Self {
         Self { next: seed << 20 }
     }
 
-    pub(crate) fn number(&mut self, low: f64, high: f64) -> f64 {
+    /// The next number, uniform in `low..high`.
+    pub fn number(&mut self, low: f64, high: f64) -> f64 {
         self.next += 1;
         let unit = f64::from(random::uniform(random::random_u32(99, 0, self.next, 0)));
         f64::from((low + (high - low) * unit) as f32)
     }
 
-    pub(crate) fn numbers(&mut self, count: usize, low: f64, high: f64) -> Vec<f32> {
+    /// The next `count` numbers, uniform in `low..high`.
+    pub fn numbers(&mut self, count: usize, low: f64, high: f64) -> Vec<f32> {
         (0..count).map(|_| self.number(low, high) as f32).collect()
     }
 
-    pub(crate) fn vector(&mut self, low: f64, high: f64) -> DVec3 {
+    /// A vector whose components are uniform in `low..high`.
+    pub fn vector(&mut self, low: f64, high: f64) -> DVec3 {
         DVec3::from_array(std::array::from_fn(|_| self.number(low, high)))
     }
 
     /// A direction whose length is 1 up to f32.
-    pub(crate) fn direction(&mut self) -> DVec3 {
+    pub fn direction(&mut self) -> DVec3 {
         loop {
             let vector = self.vector(-1.0, 1.0);
             if (0.1..1.0).contains(&vector.length()) {
@@ -65,12 +80,13 @@ impl Random {
     }
 }
 
-/// `samples` samples on `rays` rays, some of them empty.
-pub(crate) fn random_batch(random: &mut Random, rays: usize, samples: usize) -> Vec<TrainingRay> {
+/// `samples` samples on `rays` rays, some of them empty. Positions lie in the box, steps in 0.01..0.3, targets and
+/// backgrounds in 0..1.
+pub fn random_batch(random: &mut Random, rays: usize, samples: usize) -> Vec<TrainingRay> {
     let mut counts = vec![0; rays];
     // The first and every seventh ray stay empty, unless it is the only one.
     let filled: Vec<usize> = (0..rays).filter(|ray| rays == 1 || ray % 7 != 0).collect();
-    for sample in 0..samples {
+    for sample in 0..if filled.is_empty() { 0 } else { samples } {
         counts[filled[sample * sample % filled.len()]] += 1;
     }
     let sample = |random: &mut Random| RaySample {

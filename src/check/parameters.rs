@@ -1,0 +1,171 @@
+//! The parameters of a workbench's field: what lies where on the device, and the same for the reference.
+
+use super::Workbench;
+use super::draw::Random;
+use crate::config::{self, Accumulation};
+use crate::model::{FEATURES, Layer};
+use crate::reference::grid::GridLevel;
+use crate::reference::mlp::{self, Mlp};
+use crate::reference::model::{Model, Objective};
+use crate::reference::{ColorRange, Transmittance};
+use anyhow::{Result, ensure};
+
+/// Units of fixed-point gradients per gradient times 2 M.
+const GRADIENT_SCALE: f64 = 4_194_304.0;
+
+impl Workbench {
+    /// The layers of both networks, the density network first.
+    #[must_use]
+    pub fn layers(&self) -> Vec<Layer> {
+        self.plan.layout.density.iter().chain(&self.plan.layout.color).copied().collect()
+    }
+
+    /// The table, `[entries, 2]`.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn table(&self) -> Result<Vec<f32>> {
+        self.read("table", self.plan.layout.entries * FEATURES)
+    }
+
+    /// Sets the table, `[entries, 2]`.
+    pub fn set_table(&self, values: &[f32]) {
+        self.write("table", values);
+    }
+
+    /// Adam's first and second moments of the table, `[entries, 2]` each.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn table_moments(&self) -> Result<[Vec<f32>; 2]> {
+        let moments: Vec<[f32; 4]> = self.read("table_moments", self.plan.layout.entries)?;
+        Ok([0, 2].map(|at| moments.iter().flat_map(|entry| [entry[at], entry[at + 1]]).collect()))
+    }
+
+    pub(super) fn clear_table_moments(&self) {
+        self.write("table_moments", &vec![[0.0_f32; 4]; self.plan.layout.entries]);
+    }
+
+    /// The table's gradient `[entries, 2]` of a batch of `rays` rays, ready for Adam.
+    pub fn set_table_gradient(&self, gradient: &[f32], rays: usize) {
+        if self.plan.accumulation == Accumulation::Fixed {
+            let scale = 2.0 * rays as f64 * GRADIENT_SCALE;
+            let fixed = |value: f32| (f64::from(value) * scale).round() as i64;
+            let packed: Vec<i64> = (gradient.as_chunks::<2>().0.iter())
+                .map(|[low, high]| fixed(*low) + (fixed(*high) << 32))
+                .collect();
+            self.write("d_table", &packed);
+        } else {
+            self.write("d_table", gradient);
+        }
+    }
+
+    /// The weights `mlp`, or moments in their layout, layer by layer, `[outputs, inputs]`.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn weights(&self, name: &str) -> Result<Vec<Vec<f32>>> {
+        let all: Vec<f32> = self.read(name, self.plan.layout.quads * 4)?;
+        Ok(self.layers().iter().map(|layer| unpack(layer, &all)).collect())
+    }
+
+    /// Sets what [`Workbench::weights`] reads.
+    ///
+    /// # Errors
+    /// When a layer is of another size.
+    pub fn set_weights(&self, name: &str, weights: &[Vec<f32>]) -> Result<()> {
+        self.write(name, &self.pack(weights)?);
+        Ok(())
+    }
+
+    /// The weight buffer that holds these weights, layer by layer, `[outputs, inputs]`.
+    ///
+    /// # Errors
+    /// When a layer is of another size.
+    pub fn pack(&self, weights: &[Vec<f32>]) -> Result<Vec<f32>> {
+        let mut all = vec![0.0; self.plan.layout.quads * 4];
+        for (layer, weights) in self.layers().iter().zip(weights) {
+            let expected = layer.inputs * layer.outputs;
+            ensure!(weights.len() == expected, "a layer of {expected} weights was given {}", weights.len());
+            for (i, &weight) in weights.iter().enumerate() {
+                all[layer.index(i / layer.inputs, i % layer.inputs)] = weight;
+            }
+        }
+        Ok(all)
+    }
+
+    /// Random parameters: the table within ±`table`, weights within ±`gain` times Glorot's bound.
+    ///
+    /// # Errors
+    /// Never: the layers are the plan's own.
+    pub fn randomise(&self, random: &mut Random, table: f64, gain: f64) -> Result<()> {
+        self.set_table(&random.numbers(self.plan.layout.entries * FEATURES, -table, table));
+        let last = self.layers().len() - 1;
+        let weights: Vec<Vec<f32>> = (self.layers().iter().enumerate())
+            .map(|(number, layer)| {
+                let most = gain * (6.0 / (layer.inputs + layer.outputs) as f64).sqrt();
+                let mut weights = random.numbers(layer.inputs * layer.outputs, -most, most);
+                if number == last {
+                    weights[3 * layer.inputs..].fill(0.0);
+                }
+                weights
+            })
+            .collect();
+        self.set_weights("mlp", &weights)
+    }
+
+    /// The parameters on the device, as the reference takes them.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn model(&self) -> Result<Model> {
+        Ok(self.model_of(&self.table()?, &self.weights("mlp")?))
+    }
+
+    /// These parameters as the reference takes them: the table `[entries, 2]`, weights layer by layer.
+    #[must_use]
+    pub fn model_of(&self, table: &[f32], weights: &[Vec<f32>]) -> Model {
+        let layers: Vec<mlp::Layer> = (self.layers().iter().zip(weights))
+            .map(|(layer, weights)| {
+                let outputs = if layer.outputs == 4 { 3 } else { layer.outputs };
+                let weights = weights[..outputs * layer.inputs].iter().map(|&w| f64::from(w)).collect();
+                mlp::Layer { inputs: layer.inputs, outputs, weights }
+            })
+            .collect();
+        let (density, color) = layers.split_at(self.plan.layout.density.len());
+        Model {
+            levels: self.levels(),
+            table: table.iter().map(|&x| f64::from(x)).collect(),
+            density: Mlp { layers: density.to_vec() },
+            color: Mlp { layers: color.to_vec() },
+        }
+    }
+
+    /// The grid's levels as the reference takes them.
+    #[must_use]
+    pub fn levels(&self) -> Vec<GridLevel> {
+        (self.plan.layout.levels.iter())
+            .map(|level| GridLevel {
+                resolution: level.resolution,
+                offset: level.first as usize,
+                entries: level.entries as usize,
+                dense: level.dense == 1,
+            })
+            .collect()
+    }
+
+    /// What the plan minimises, as the reference takes it.
+    #[must_use]
+    pub fn objective(&self) -> Objective {
+        let transmittance = match self.plan.config.transmittance {
+            config::Transmittance::Exclusive => Transmittance::Exclusive,
+            config::Transmittance::Inclusive => Transmittance::Inclusive,
+        };
+        let color_range = if self.plan.needs.hdr { ColorRange::Hdr } else { ColorRange::Ldr };
+        Objective { transmittance, color_range }
+    }
+}
+
+fn unpack(layer: &Layer, all: &[f32]) -> Vec<f32> {
+    (0..layer.outputs * layer.inputs).map(|i| all[layer.index(i / layer.inputs, i % layer.inputs)]).collect()
+}
