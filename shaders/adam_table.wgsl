@@ -1,7 +1,6 @@
 // Adam on the hash table, two entries per thread. A parameter whose gradient is exactly zero was not touched by
-// this batch: it and its moments stay. Needs: step, counters, adam, gradient.
+// this batch: it and its moments stay. Needs: step, adam, gradient.
 
-var<storage, read> counters: Counters;
 tensor<read_write> table: vec2<f32>;
 // First moments of both features, then the second moments.
 tensor<read_write> table_moments: vec4<f32>;
@@ -12,8 +11,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     if index >= TABLE_ENTRIES {
         return;
     }
-    let rays = f32(counters.rays_used);
-    let gradient = vec4(gradient_take(index, rays), gradient_take(index + 1u, rays));
+    let gradient = vec4(gradient_take(index), gradient_take(index + 1u));
     let touched = gradient != vec4(0.0);
     if !any(touched) {
         return;

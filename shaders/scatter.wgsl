@@ -13,7 +13,6 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if index >= counters.kept || !gradients_usable() {
         return;
     }
-    let rays = f32(counters.rays_used);
     let position = samples_load(kept_rows_load(index).x).xyz;
     for (var l = 0u; l < LEVELS; l++) {
         let level = levels[l];
@@ -23,13 +22,13 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             continue;
         }
         let cell = grid_cell(position, level);
-        gradient_add(cell.entries[0], cell.weights[0] * gradient, rays);
-        gradient_add(cell.entries[1], cell.weights[1] * gradient, rays);
-        gradient_add(cell.entries[2], cell.weights[2] * gradient, rays);
-        gradient_add(cell.entries[3], cell.weights[3] * gradient, rays);
-        gradient_add(cell.entries[4], cell.weights[4] * gradient, rays);
-        gradient_add(cell.entries[5], cell.weights[5] * gradient, rays);
-        gradient_add(cell.entries[6], cell.weights[6] * gradient, rays);
-        gradient_add(cell.entries[7], cell.weights[7] * gradient, rays);
+        gradient_add(cell.entries[0], cell.weights[0] * gradient);
+        gradient_add(cell.entries[1], cell.weights[1] * gradient);
+        gradient_add(cell.entries[2], cell.weights[2] * gradient);
+        gradient_add(cell.entries[3], cell.weights[3] * gradient);
+        gradient_add(cell.entries[4], cell.weights[4] * gradient);
+        gradient_add(cell.entries[5], cell.weights[5] * gradient);
+        gradient_add(cell.entries[6], cell.weights[6] * gradient);
+        gradient_add(cell.entries[7], cell.weights[7] * gradient);
     }
 }

@@ -169,7 +169,7 @@ pub enum Accumulation {
     Auto,
     /// One thread per level adds in the order of the samples: no atomics, and every run gives the same sum.
     Ordered,
-    /// Two fixed-point numbers in a 64-bit integer atomic: independent of order.
+    /// 64-bit integers, each in two 32-bit atomics: independent of order.
     Fixed,
     /// Float atomics.
     Float,

@@ -27,8 +27,6 @@ pub struct Gpu {
 
 /// Features that speed the training up and are used wherever the adapter has them.
 const WANTED_FEATURES: wgpu::Features = wgpu::Features::SHADER_FLOAT32_ATOMIC
-    .union(wgpu::Features::SHADER_INT64)
-    .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
     .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
     .union(wgpu::Features::CLEAR_TEXTURE)
     .union(wgpu::Features::SUBGROUP)

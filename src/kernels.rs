@@ -49,6 +49,7 @@ const EXP: Part = part!("common/exp.wgsl");
 const DENSITY: Part = part!("common/density.wgsl");
 const GRID: Part = part!("common/grid.wgsl");
 const HARMONICS: Part = part!("common/harmonics.wgsl");
+const USABLE: Part = part!("common/usable.wgsl");
 const ADAM: Part = part!("common/adam.wgsl");
 const COUNT_SAMPLES: Part = part!("layer/count_samples.wgsl");
 const COUNT_KEPT: Part = part!("layer/count_kept.wgsl");
@@ -246,7 +247,6 @@ impl Plan {
             ("BETA_2", config.optimizer.beta_2),
             ("EPSILON", config.optimizer.epsilon),
             ("L2", config.optimizer.l2),
-            ("GRADIENT_SCALE", 4_194_304.0),
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         source.constant("BACKGROUND", vec3(config.background.solid()))
@@ -286,15 +286,19 @@ impl Plan {
         }
     }
 
-    /// The parts that add a gradient and take the sum.
-    fn gradient(&self) -> [Part; 2] {
+    /// The parts that add a gradient, and those that take the sum.
+    fn gradient(&self) -> [Vec<Part>; 2] {
         let float = part!("gradient/take_float.wgsl");
         match self.accumulation {
-            Accumulation::Fixed => [part!("gradient/fixed.wgsl"), part!("gradient/take_fixed.wgsl")],
-            Accumulation::Float => [part!("gradient/float.wgsl"), float],
-            Accumulation::Exchange => [part!("gradient/exchange.wgsl"), float],
+            Accumulation::Fixed => {
+                let scale = part!("gradient/fixed_scale.wgsl");
+                let take = part!("gradient/take_fixed.wgsl");
+                [vec![scale, part!("gradient/fixed.wgsl")], vec![COUNTERS, USABLE, scale, take]]
+            }
+            Accumulation::Float => [vec![part!("gradient/float.wgsl")], vec![float]],
+            Accumulation::Exchange => [vec![part!("gradient/exchange.wgsl")], vec![float]],
             Accumulation::Auto | Accumulation::Ordered => {
-                [part!("scatter_ordered.wgsl"), part!("gradient/take_ordered.wgsl")]
+                [vec![part!("scatter_ordered.wgsl")], vec![part!("gradient/take_ordered.wgsl")]]
             }
         }
     }

@@ -17,7 +17,7 @@ fn gradient_add_scalar(index: u32, gradient: f32) {
     }
 }
 
-fn gradient_add(entry: u32, gradient: vec2<f32>, rays: f32) {
+fn gradient_add(entry: u32, gradient: vec2<f32>) {
     gradient_add_scalar(2u * entry, gradient.x);
     gradient_add_scalar(2u * entry + 1u, gradient.y);
 }

@@ -1,18 +1,30 @@
-// Provides: gradients of the table as two 32-bit fixed-point numbers in one 64-bit atomic. Sums do not depend
-// on their order, and one locked operation serves both features.
-// The sums are of gradients times 2 M, so that their range does not depend on the number of rays.
+// Provides: gradients of the table as 64-bit integers, each in two 32-bit atomics, the lower half first. Sums of
+// integers do not depend on their order. Needs: fixed_scale.
 
-var<storage, read_write> d_table: array<atomic<u64>>;
+var<storage, read_write> d_table: array<atomic<u32>>;
 
-const GRADIENT_MOST = 1e9;
-
-fn gradient_add(entry: u32, gradient: vec2<f32>, rays: f32) {
-    let scaled = clamp(gradient * (2.0 * rays * GRADIENT_SCALE), vec2(-GRADIENT_MOST), vec2(GRADIENT_MOST));
-    let fixed = vec2<i32>(round(scaled));
-    if fixed.x == 0 && fixed.y == 0 {
+fn gradient_add_scalar(index: u32, gradient: f32) {
+    let size = round(abs(gradient) * power_of_two(gradient_scale_exponent()));
+    if size == 0.0 {
         return;
     }
-    // The low half is sign-extended: what it borrows from the high half comes back when it is taken out.
-    let packed = i64(fixed.x) + (i64(fixed.y) << 32u);
-    atomicAdd(&d_table[entry], bitcast<u64>(packed));
+    // Both halves are exact: a float has only 24 bits.
+    let upper = floor(size * power_of_two(-32));
+    var high = u32(upper);
+    var low = u32(size - upper * power_of_two(32));
+    if gradient < 0.0 {
+        high = ~high + select(0u, 1u, low == 0u);
+        low = ~low + 1u;
+    }
+    let old = atomicAdd(&d_table[2u * index], low);
+    let carry = select(0u, 1u, old + low < old);
+    // Where a small negative number crosses no zero, its upper half and the carry cancel.
+    if high + carry != 0u {
+        atomicAdd(&d_table[2u * index + 1u], high + carry);
+    }
+}
+
+fn gradient_add(entry: u32, gradient: vec2<f32>) {
+    gradient_add_scalar(2u * entry, gradient.x);
+    gradient_add_scalar(2u * entry + 1u, gradient.y);
 }

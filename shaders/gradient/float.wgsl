@@ -2,7 +2,7 @@
 
 var<storage, read_write> d_table: array<atomic<f32>>;
 
-fn gradient_add(entry: u32, gradient: vec2<f32>, rays: f32) {
+fn gradient_add(entry: u32, gradient: vec2<f32>) {
     if gradient.x != 0.0 {
         atomicAdd(&d_table[2u * entry], gradient.x);
     }

@@ -10,9 +10,6 @@ use crate::reference::model::{Model, Objective};
 use crate::reference::{ColorRange, Transmittance};
 use anyhow::{Result, ensure};
 
-/// Units of fixed-point gradients per gradient times 2 M.
-const GRADIENT_SCALE: f64 = 4_194_304.0;
-
 impl Workbench {
     /// The layers of both networks, the density network first.
     #[must_use]
@@ -46,18 +43,19 @@ impl Workbench {
         self.write("table_moments", &vec![[0.0_f32; 4]; self.plan.layout.entries]);
     }
 
-    /// The table's gradient `[entries, 2]` of a batch of `rays` rays, ready for Adam.
-    pub fn set_table_gradient(&self, gradient: &[f32], rays: usize) {
-        if self.plan.accumulation == Accumulation::Fixed {
-            let scale = 2.0 * rays as f64 * GRADIENT_SCALE;
-            let fixed = |value: f32| (f64::from(value) * scale).round() as i64;
-            let packed: Vec<i64> = (gradient.as_chunks::<2>().0.iter())
-                .map(|[low, high]| fixed(*low) + (fixed(*high) << 32))
-                .collect();
-            self.write("d_table", &packed);
-        } else {
-            self.write("d_table", gradient);
+    /// The table's gradient `[entries, 2]`, ready for Adam. No sample is kept.
+    pub fn set_table_gradient(&self, gradient: &[f32]) {
+        if self.plan.accumulation != Accumulation::Fixed {
+            return self.write("d_table", gradient);
         }
+        let most = gradient.iter().fold(0.0_f32, |most, value| most.max(value.abs()));
+        self.write("gradient_range", &[most.to_bits()]);
+        // As `gradient/fixed_scale.wgsl` says: |gradient| < 2^exponent becomes an integer below 2^62.
+        let exponent = (most.to_bits() >> 23).cast_signed() - 126;
+        let scale = 2f64.powi((62 - exponent).min(100));
+        let sums: Vec<i64> =
+            gradient.iter().map(|&value| (f64::from(value) * scale).round() as i64).collect();
+        self.write("d_table", &sums);
     }
 
     /// The weights `mlp`, or moments in their layout, layer by layer, `[outputs, inputs]`.

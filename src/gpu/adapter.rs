@@ -18,7 +18,7 @@ pub struct Listing {
     pub driver: String,
     /// The largest buffer binding, in bytes.
     pub max_binding_bytes: u64,
-    /// Whether f32 atomics, 64-bit integer atomics and timestamps are there.
+    /// Whether f32 atomics and timestamps are there.
     pub features: Vec<&'static str>,
 }
 
@@ -52,7 +52,6 @@ fn describe(index: usize, adapter: &wgpu::Adapter) -> Listing {
     let info = adapter.get_info();
     let features = [
         ("float32-atomics", wgpu::Features::SHADER_FLOAT32_ATOMIC),
-        ("int64-atomics", wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS),
         ("timestamps", wgpu::Features::TIMESTAMP_QUERY),
     ];
     Listing {

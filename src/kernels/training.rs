@@ -4,7 +4,7 @@ use super::color::COLOR_HIDDEN;
 use super::density::{layer_stage, quads};
 use super::marching::{SPARE_ROWS, kept_capacity};
 use super::{
-    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_STORE, STEP,
+    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_STORE, STEP, USABLE,
     Workspace, dispatch,
 };
 use crate::config::Accumulation;
@@ -59,7 +59,9 @@ pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()>
     plan.allocate(gpu, workspace, &hidden[..plan.config.network.color_layers])?;
     let ordered = plan.accumulation == Accumulation::Ordered;
     let memory = if ordered { plan.memory } else { Memory::Buffers };
-    workspace.add_tensor(gpu.tensor("d_table", Element::Vec2, layout.entries, memory)?);
+    // Integers of 64 bits take twice the room of floats.
+    let rows = layout.entries * if plan.accumulation == Accumulation::Fixed { 2 } else { 1 };
+    workspace.add_tensor(gpu.tensor("d_table", Element::Vec2, rows, memory)?);
     for name in ["mlp_first", "mlp_second", "d_weights"] {
         workspace.add(gpu.storage::<[f32; 4]>(name, layout.quads)?);
     }
@@ -203,18 +205,18 @@ fn weight_kernel(gpu: &Gpu, plan: &Plan, outputs: usize) -> Result<Kernel> {
 /// # Errors
 /// When a kernel cannot be built.
 pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
-    const USABLE: Part = part!("common/usable.wgsl");
     const MAGNITUDE: Part = part!("common/magnitude.wgsl");
     let [add, take] = plan.gradient();
-    let mut parts = vec![COUNTERS, GRID, USABLE, add];
+    let mut scattering = [&[COUNTERS, GRID, USABLE], add.as_slice()].concat();
     if plan.accumulation != Accumulation::Ordered {
-        parts.push(part!("scatter.wgsl"));
+        scattering.push(part!("scatter.wgsl"));
     }
+    let taking = [&[STEP, ADAM], take.as_slice(), &[part!("adam_table.wgsl")]].concat();
     let bind = |label: &str, parts: &[Part]| workspace.bind(gpu, &plan.kernel(gpu, label, parts)?, &[]);
     let range = bind("gradient range", &[COUNTERS, MAGNITUDE, part!("gradient_range.wgsl")])?;
     let sums = bind("weight sums", &[MAGNITUDE, part!("weight_sums.wgsl")])?;
-    let scatter = bind("scatter", &parts)?;
-    let table = bind("adam table", &[STEP, COUNTERS, ADAM, take, part!("adam_table.wgsl")])?;
+    let scatter = bind("scatter", &scattering)?;
+    let table = bind("adam table", &taking)?;
     let mlp = bind("adam mlp", &[STEP, ADAM, USABLE, part!("adam_mlp.wgsl")])?;
     let finish = bind("finish", &[COUNTERS, USABLE, part!("finish.wgsl")])?;
     let sizes = workspace.get("dispatch");
@@ -241,7 +243,7 @@ pub const STATE: [&str; 6] = ["table", "table_moments", "mlp", "mlp_first", "mlp
 #[must_use]
 pub fn accumulation_name(accumulation: Accumulation) -> &'static str {
     match accumulation {
-        Accumulation::Fixed => "fixed-point gradients",
+        Accumulation::Fixed => "integer gradients",
         Accumulation::Ordered => "ordered gradients",
         Accumulation::Float => "float-atomic gradients",
         Accumulation::Auto | Accumulation::Exchange => "compare-exchange gradients",
