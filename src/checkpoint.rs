@@ -53,7 +53,7 @@ pub struct About {
     pub step: u32,
     /// Rays of the next step.
     pub rays: u32,
-    /// Seconds of training.
+    /// Seconds of training; 0 of a deterministic one.
     pub seconds: f64,
     /// When the training is to end.
     pub budget: Budget,

@@ -79,6 +79,9 @@ pub(crate) struct Train {
     /// Seed of every random number
     #[arg(long, value_name = "K")]
     pub(crate) seed: Option<u32>,
+    /// The same checkpoint bit for bit, in any number of threads, from the same adapter, program, seed and --steps
+    #[arg(long, conflicts_with = "seconds")]
+    pub(crate) deterministic: bool,
     /// Measure a few test views every N steps
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) eval_every: Option<u32>,

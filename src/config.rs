@@ -29,6 +29,9 @@ pub struct Config {
     pub transmittance: Transmittance,
     /// How gradients of the table are summed; `auto` chooses by adapter.
     pub accumulation: Accumulation,
+    /// The same checkpoint bit for bit from the same adapter, program, seed and number of steps: gradients are
+    /// summed in an order, or as integers, and no time of day or duration is stored.
+    pub deterministic: bool,
     /// Seed of every random number.
     pub seed: u32,
 }
@@ -164,7 +167,8 @@ pub enum Transmittance {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Accumulation {
-    /// Ordered on CPU adapters, float atomics elsewhere, compare-exchange where there are none.
+    /// Ordered on CPU adapters; elsewhere fixed where the training is deterministic, else float atomics, else
+    /// compare-exchange where there are none.
     #[default]
     Auto,
     /// One thread per level adds in the order of the samples: no atomics, and every run gives the same sum.
@@ -289,6 +293,13 @@ impl Config {
     /// Names the first key out of range, what is allowed and what was found.
     pub fn validate(&self) -> Result<()> {
         let Self { grid, network, march, occupancy, batch, selection, optimizer, .. } = self;
+        if self.deterministic && matches!(self.accumulation, Accumulation::Float | Accumulation::Exchange) {
+            bail!(
+                "a deterministic training must not add floats in any order: accumulation must be auto, ordered or \
+                 fixed; found {:?}",
+                self.accumulation
+            );
+        }
         let whole = |key: &str, value: usize, low: usize, high: usize, step: usize| {
             if value < low || value > high || !value.is_multiple_of(step) {
                 bail!("{key} must be a multiple of {step} from {low} to {high}; found {value}");

@@ -110,6 +110,7 @@ impl Plan {
     pub fn new(gpu: &Gpu, config: Config, layout: Layout, needs: Needs) -> Self {
         let accumulation = match config.accumulation {
             Accumulation::Auto if gpu.is_cpu() => Accumulation::Ordered,
+            Accumulation::Auto if config.deterministic => Accumulation::Fixed,
             Accumulation::Auto if gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC) => Accumulation::Float,
             Accumulation::Auto => Accumulation::Exchange,
             chosen => chosen,

@@ -87,7 +87,15 @@ fn a_short_training_learns_the_scene() {
         for key in ["step", "seconds", "loss", "psnr", "rays", "samples", "marched", "learning_rate"] {
             assert!(row[key].is_number(), "{key} in {row}");
         }
+        assert_eq!(row["skipped"], 0);
     }
+    assert!(rows[0]["left_out"].is_array() && rows[0]["driver"].is_string());
+    let timed = rows.iter().rfind(|row| row["event"] == "stages");
+    let stages = timed.and_then(|row| row["stages"].as_array()).map_or(0, Vec::len);
+    assert!(
+        stages > 15 || !rows[0]["adapter"].to_string().contains("llvmpipe"),
+        "{stages} stages were timed"
+    );
     let measured: Vec<&Value> = rows.iter().filter(|row| row.get("eval_psnr").is_some()).collect();
     assert_eq!(
         measured.iter().map(|row| row["views"].as_u64()).collect::<Vec<_>>(),
@@ -265,4 +273,64 @@ fn a_diverging_training_stops_and_keeps_the_good_checkpoint() {
         .code(1)
         .stderr(contains("not finite").and(contains("learning_rate")).and(contains("step 16 is kept")));
     assert_eq!(fs::read(&file).expect("still there"), before);
+}
+
+/// Far too high a learning rate ends with a message or in a field that is all numbers.
+#[test]
+fn far_too_high_learning_rates() {
+    for rate in ["1", "1000"] {
+        let run = folder(&format!("rate_{rate}"));
+        let rate = format!("optimizer.learning_rate={rate}");
+        let args =
+            ["train", text(&TOYS), "--out", text(&run), "--config", SMOKE, "--steps", "64", "--set", &rate];
+        let output = nerf(&args).assert().get_output().clone();
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        match output.status.code() {
+            Some(0) => drop(checkpoint(&run)),
+            Some(1) => assert!(message.contains("learning_rate"), "{message}"),
+            other => panic!("exit code {other:?}: {message}"),
+        }
+    }
+}
+
+/// In any number of threads, and with the clock at another time. A software driver's threads are counted by
+/// `LP_NUM_THREADS`.
+#[test]
+fn deterministic_trainings_are_equal_bit_for_bit() {
+    for accumulation in ["auto", "fixed"] {
+        let set = format!("accumulation={accumulation}");
+        let bytes = |threads: &str, steps: &[&str]| {
+            let run = folder(&format!("deterministic_{accumulation}_{threads}"));
+            for (number, steps) in steps.iter().enumerate() {
+                let args = [
+                    "train",
+                    text(&TOYS),
+                    "--out",
+                    text(&run),
+                    "--deterministic",
+                    "--no-eval",
+                    "--set",
+                    &set,
+                ];
+                let mut command = nerf(&args);
+                // A constant learning rate, so that a stop in the middle makes no difference.
+                command.args(["--set", "optimizer.final_learning_rate=0.01", "--steps", steps]);
+                match number {
+                    0 => command.args(["--config", SMOKE]),
+                    _ => command.arg("--resume"),
+                };
+                command.env("LP_NUM_THREADS", threads).assert().success();
+            }
+            fs::read(run.join("checkpoint.safetensors")).expect("a checkpoint")
+        };
+        let first = bytes("1", &["48"]);
+        assert!(first == bytes("2", &["48"]), "{accumulation}: the checkpoints differ");
+        assert!(first == bytes("3", &["20", "48"]), "{accumulation}: the resumed checkpoint differs");
+    }
+    let run = folder("deterministic_seconds");
+    let args = ["train", text(&TOYS), "--out", text(&run), "--set", "deterministic=true", "--seconds", "3"];
+    nerf(&args).assert().code(1).stderr(contains("--steps"));
+    let args =
+        ["train", text(&TOYS), "--out", text(&run), "--deterministic", "--set", "accumulation=exchange"];
+    nerf(&args).assert().code(1).stderr(contains("accumulation must be auto"));
 }

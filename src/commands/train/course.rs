@@ -36,6 +36,8 @@ pub(super) struct Course<'a> {
     remarks: Remarks,
     /// Seconds of training so far.
     seconds: f64,
+    /// Step and seconds at the beginning of this run.
+    start: (u32, f64),
     /// Step and seconds of the newest checkpoint; step 0 when there is none.
     saved: (u32, f64),
     loss: Option<f64>,
@@ -80,7 +82,9 @@ impl<'a> Course<'a> {
         checkpoint: PathBuf,
         remarks: Remarks,
     ) -> Self {
-        let (seconds, saved) = (about.seconds, (about.step, about.seconds));
+        // A deterministic training's checkpoint does not tell.
+        let seconds = about.seconds.max(log.seconds);
+        let start = (about.step, seconds);
         let stages = StageTimes::new(trainer.gpu());
         Self {
             about,
@@ -90,7 +94,8 @@ impl<'a> Course<'a> {
             exam: None,
             remarks,
             seconds,
-            saved,
+            start,
+            saved: start,
             loss: None,
             is_empty: false,
             skipped: (0, 0),
@@ -201,8 +206,8 @@ impl<'a> Course<'a> {
         let spent = budget.spent(step, seconds);
         progress.update(spent, || {
             let per_second = |count: u64| short(count as f64 / elapsed.max(1e-9));
-            let earlier = budget.spent(self.about.step, self.about.seconds);
-            let remaining = (seconds - self.about.seconds) * (1.0 - spent) / (spent - earlier).max(1e-9);
+            let earlier = budget.spent(self.start.0, self.start.1);
+            let remaining = (seconds - self.start.1) * (1.0 - spent) / (spent - earlier).max(1e-9);
             format!(
                 "step {step}, loss {:.5}, PSNR {psnr:.2} dB, {} rays/s, {} samples/s, {}, {} to go",
                 stats.loss,
@@ -233,11 +238,13 @@ impl<'a> Course<'a> {
 
     fn save(&mut self) -> Result<()> {
         let state = self.trainer.state()?;
-        let (step, rays, seconds) = (state.step, state.rays, self.seconds);
+        let (step, rays) = (state.step, state.rays);
+        // No two runs take the same time; the log has it.
+        let seconds = if self.about.config.deterministic { 0.0 } else { self.seconds };
         let about = About { step, rays, seconds, ..self.about.clone() };
         let checkpoint = Checkpoint { about, state };
         checkpoint.save(&self.checkpoint).with_context(|| format!("at step {step} ({})", self.kept()))?;
-        self.saved = (step, seconds);
+        self.saved = (step, self.seconds);
         Ok(())
     }
 

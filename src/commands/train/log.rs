@@ -12,13 +12,15 @@ use std::path::{Path, PathBuf};
 pub(super) struct Log {
     path: PathBuf,
     file: File,
+    /// Seconds of training that its rows tell of.
+    pub(super) seconds: f64,
 }
 
 impl Log {
     /// Begins a new log.
     pub(super) fn create(path: &Path) -> Result<Self> {
         let file = File::create(path).with_context(|| format!("creating {}", path.display()))?;
-        Ok(Self { path: path.to_owned(), file })
+        Ok(Self { path: path.to_owned(), file, seconds: 0.0 })
     }
 
     /// Goes on with a log behind what was logged up to `step`: rows of steps that are taken again, and a row
@@ -29,16 +31,14 @@ impl Log {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
             Err(error) => return Err(error).with_context(|| format!("reading {}", path.display())),
         };
-        let is_kept = |line: &&str| {
-            let row: Option<Value> = serde_json::from_str(line).ok();
-            row.is_some_and(|row| row["step"].as_u64().is_none_or(|at| at <= u64::from(step)))
-        };
-        write_atomically(path, |file| {
-            text.lines().filter(is_kept).try_for_each(|line| Ok(writeln!(file, "{line}")?))
-        })?;
+        let rows = text.lines().filter_map(|line| Some((line, serde_json::from_str(line).ok()?)));
+        let is_kept = |(_, row): &(_, Value)| row["step"].as_u64().is_none_or(|at| at <= u64::from(step));
+        let rows: Vec<_> = rows.filter(is_kept).collect();
+        write_atomically(path, |file| rows.iter().try_for_each(|(line, _)| Ok(writeln!(file, "{line}")?)))?;
+        let seconds = rows.iter().filter_map(|(_, row)| row["seconds"].as_f64()).fold(0.0, f64::max);
         let file = OpenOptions::new().append(true).open(path);
         let file = file.with_context(|| format!("opening {}", path.display()))?;
-        Ok(Self { path: path.to_owned(), file })
+        Ok(Self { path: path.to_owned(), file, seconds })
     }
 
     /// Adds a row; it is in the file when this returns.
@@ -60,13 +60,17 @@ mod tests {
         let mut log = Log::create(&path).expect("writable");
         log.write(&json!({ "event": "start" })).expect("writable");
         for step in [16, 32, 48] {
-            log.write(&json!({ "step": step })).expect("writable");
+            log.write(&json!({ "seconds": f64::from(step) / 8.0, "step": step })).expect("writable");
         }
         std::fs::write(&path, std::fs::read_to_string(&path).expect("text") + "{\"step\": 6")
             .expect("writable");
         let mut log = Log::resume(&path, 32).expect("readable");
+        assert_eq!(log.seconds, 4.0);
         log.write(&json!({ "step": 64 })).expect("writable");
         let text = std::fs::read_to_string(&path).expect("text");
-        assert_eq!(text, "{\"event\":\"start\"}\n{\"step\":16}\n{\"step\":32}\n{\"step\":64}\n");
+        let lines: Vec<_> = text.lines().collect();
+        let [first, second, rest] = ["2.0,\"step\":16}", "4.0,\"step\":32}", "{\"step\":64}"];
+        assert_eq!(lines[0], "{\"event\":\"start\"}");
+        assert!(lines[1].ends_with(first) && lines[2].ends_with(second) && lines[3..] == [rest], "{text}");
     }
 }

@@ -59,6 +59,11 @@ impl Setup {
         about.adapter.clone_from(&gpu.info.name);
         about.budget = budget(args, gpu, state.as_ref().map(|_| about.budget));
         about.budget.validate()?;
+        ensure!(
+            !about.config.deterministic || about.budget.seconds.is_none(),
+            "a deterministic training needs --steps N and no --seconds: how many steps fit into a time differs from \
+             run to run"
+        );
         let plan = Plan::new(gpu, about.config.clone(), about.layout(), about.needs.clone());
         let cameras = cameras(dataset, &train);
         Ok(Self { about, plan, state, train, test, cameras })
@@ -120,6 +125,7 @@ fn configure(mut config: Config, args: &Train) -> Result<Config> {
     }
     config.seed = args.seed.unwrap_or(config.seed);
     config.background = args.background.unwrap_or(config.background);
+    config.deterministic |= args.deterministic;
     config.validate()?;
     Ok(config)
 }
