@@ -202,7 +202,8 @@ fn log_densities_beyond_the_exponent() {
     }
 }
 
-/// Adam does not care how small a gradient is, and cells are occupied relative to the mean.
+/// Where nothing is opaque no density has much of a gradient. The decay of the weights brings it back, Adam does not
+/// care how small a gradient is, and cells are occupied relative to the mean.
 #[test]
 fn an_empty_start_recovers() {
     let mut training = Scene::default().train();
@@ -213,7 +214,7 @@ fn an_empty_start_recovers() {
     assert!(last.loss < 0.5 * first.loss, "{first:?} {last:?}");
 }
 
-/// Behind an opaque front no density has a gradient: what dissolves it is the decay of the weights.
+/// Behind an opaque front no density has a gradient: it dissolves from the front.
 #[test]
 fn an_opaque_start_recovers() {
     let mut training = Scene::default().train();
