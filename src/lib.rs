@@ -59,6 +59,7 @@
 
 pub mod camera;
 pub mod check;
+pub mod chart;
 pub mod checkpoint;
 pub mod config;
 pub mod dataset;
