@@ -47,6 +47,8 @@ pub(crate) enum Command {
     Render(Render),
     /// Measure a trained field against photos: PSNR and SSIM
     Eval(Eval),
+    /// Write the page about a training: curves, test views, settings
+    Report(Report),
     /// Write an analytic scene with exact ground truth as a dataset
     Generate(Generate),
     /// List the adapters of this machine
@@ -58,7 +60,7 @@ pub(crate) enum Command {
 pub(crate) struct Train {
     /// A folder with transforms.json or transforms_train.json, or such a file
     pub(crate) dataset: PathBuf,
-    /// Folder to write config.json, checkpoint.safetensors and log.jsonl to
+    /// Folder to write config.json, checkpoint.safetensors, log.jsonl and report.html to
     #[arg(long, value_name = "RUN")]
     pub(crate) out: PathBuf,
     /// JSON file with the settings that differ from the defaults
@@ -166,6 +168,19 @@ pub(crate) struct Eval {
     /// Write the renderings, over the background, as PNG to this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) save: Option<PathBuf>,
+}
+
+/// `nerf report`
+#[derive(Args, Debug)]
+pub(crate) struct Report {
+    /// The folder that `nerf train` wrote
+    pub(crate) run: PathBuf,
+    /// The dataset with the photos to show [default: the one trained on, where it was then]
+    #[arg(long)]
+    pub(crate) dataset: Option<PathBuf>,
+    /// The page to write [default: RUN/report.html]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// `nerf generate`

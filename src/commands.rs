@@ -5,6 +5,7 @@ mod eval;
 mod field;
 mod generate;
 mod render;
+mod report;
 mod scores;
 mod train;
 
@@ -26,6 +27,7 @@ pub(crate) fn run(cli: &Cli) -> Result<()> {
         Command::Train(args) => train::run(args, &session),
         Command::Render(args) => render::run(args, &session),
         Command::Eval(args) => eval::run(args, &session),
+        Command::Report(args) => report::run(args, &session),
         Command::Generate(args) => generate::run(args, &session),
         Command::Adapters => adapters::run(&session),
     }

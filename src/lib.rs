@@ -58,8 +58,8 @@
 //! ```
 
 pub mod camera;
-pub mod check;
 pub mod chart;
+pub mod check;
 pub mod checkpoint;
 pub mod config;
 pub mod dataset;
@@ -73,7 +73,9 @@ pub mod orbit;
 pub mod picture;
 pub mod reference;
 pub mod render;
+pub mod report;
 pub mod scene;
 pub mod schedule;
 pub mod train;
 pub mod visibility;
+pub mod words;

@@ -6,6 +6,8 @@ use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+pub(crate) use nerf::words::{duration, short};
+
 /// Time between two lines where there is no terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 /// Resolution of the bar.
@@ -67,36 +69,5 @@ impl Drop for Progress {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
-    }
-}
-
-/// A duration as people say it.
-pub(crate) fn duration(seconds: f64) -> String {
-    match seconds.max(0.0).round() as u64 {
-        _ if seconds < 10.0 => format!("{:.1} s", seconds.max(0.0)),
-        seconds @ 0..120 => format!("{seconds} s"),
-        seconds @ 120..7200 => format!("{} min {:02} s", seconds / 60, seconds % 60),
-        seconds => format!("{} h {:02} min", seconds / 3600, seconds / 60 % 60),
-    }
-}
-
-/// A rate or count with a unit prefix.
-pub(crate) fn short(number: f64) -> String {
-    match number {
-        number if number >= 1e6 => format!("{:.1}M", number / 1e6),
-        number if number >= 1e3 => format!("{:.1}k", number / 1e3),
-        number => format!("{number:.0}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_short() {
-        let all = [0.25, 42.4, 119.0, 125.0, 7384.0].map(duration);
-        assert_eq!(all, ["0.2 s", "42 s", "119 s", "2 min 05 s", "2 h 03 min"]);
-        assert_eq!([7.0, 1234.0, 5.67e6].map(short), ["7", "1.2k", "5.7M"]);
     }
 }

@@ -55,9 +55,22 @@ pub(super) struct Judge<'a> {
     pub(super) dataset: &'a Dataset,
 }
 
+/// A rendered view beside its photo.
+#[derive(Debug)]
+pub(super) struct Compared {
+    /// How alike they are.
+    pub(super) score: Score,
+    /// Width and height in pixels.
+    pub(super) size: [u32; 2],
+    /// The rendering, display-referred.
+    pub(super) rendered: Vec<[f32; 3]>,
+    /// The photo, display-referred.
+    pub(super) photo: Vec<[f32; 3]>,
+}
+
 impl Judge<'_> {
-    /// The score of frame `index`, whose photo is `image`, and the rendering, display-referred.
-    pub(super) fn score(&mut self, index: usize, image: &Image) -> Result<(Score, Vec<[f32; 3]>)> {
+    /// Renders frame `index`, whose photo is `image`, and compares.
+    fn compare(&mut self, index: usize, image: &Image) -> Result<Compared> {
         let frame = &self.dataset.frames[index];
         let view = self.renderer.render(&frame.camera)?;
         let rendered = self.color_space.over(&view.color, self.background);
@@ -69,12 +82,24 @@ impl Judge<'_> {
             ssim: ssim(&rendered, &photo, width, height),
             saved: None,
         };
-        Ok((score, rendered))
+        Ok(Compared { score, size: [view.width, view.height], rendered, photo })
     }
 
-    /// The score of frame `index`, whose photo is decoded for it.
-    pub(super) fn load_and_score(&mut self, index: usize) -> Result<(Score, Vec<[f32; 3]>)> {
+    /// The score of frame `index`, whose photo is `image`, and the rendering, display-referred.
+    pub(super) fn score(&mut self, index: usize, image: &Image) -> Result<(Score, Vec<[f32; 3]>)> {
+        let compared = self.compare(index, image)?;
+        Ok((compared.score, compared.rendered))
+    }
+
+    /// Renders frame `index`, whose photo is decoded for it, and compares.
+    pub(super) fn load_and_compare(&mut self, index: usize) -> Result<Compared> {
         let images = self.dataset.load_images(&[index], &|_| {})?;
-        self.score(index, &images[0])
+        self.compare(index, &images[0])
+    }
+
+    /// The score of frame `index`, whose photo is decoded for it, and the rendering.
+    pub(super) fn load_and_score(&mut self, index: usize) -> Result<(Score, Vec<[f32; 3]>)> {
+        let compared = self.load_and_compare(index)?;
+        Ok((compared.score, compared.rendered))
     }
 }

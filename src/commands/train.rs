@@ -6,17 +6,19 @@ mod log;
 mod setup;
 mod stages;
 
-use super::scores::{Judge, Means};
-use super::{Session, writable_folder};
+use super::scores::Judge;
+use super::{Session, report, writable_folder};
 use crate::cli::Train;
 use crate::progress::{Progress, duration};
 use anyhow::Result;
 use course::{Course, End, Exam};
 use folder::RunFolder;
+use nerf::checkpoint::About;
 use nerf::dataset::{Dataset, OpenOptions};
 use nerf::gpu::Gpu;
 use nerf::picture::ColorSpace;
 use nerf::render::Renderer;
+use nerf::report::views::TestViews;
 use nerf::train::{Trainer, Views};
 use serde_json::{Value, json};
 use setup::Setup;
@@ -92,7 +94,7 @@ fn exam<'a>(
     Ok(Some(Exam { judge, every: args.eval_every, few: few.into_iter().zip(images).collect() }))
 }
 
-/// Measures all test views, unless the training was interrupted, and prints the result.
+/// Measures all test views, unless the training was interrupted, writes the report and prints the result.
 fn finish(
     args: &Train,
     mut course: Course<'_>,
@@ -118,33 +120,52 @@ fn finish(
     }
     if end.interrupted {
         text = format!("interrupted after {text}; go on with --resume");
-        return session.print(&result, &text);
     }
-    let exam = course.exam.take().filter(|_| !args.no_eval);
-    if let Some(means) = exam.map(|exam| all_views(exam.judge, &setup.test, session)).transpose()?.flatten() {
-        let (psnr, ssim, views) = (means.psnr, means.ssim, means.views);
-        course.log.write(&json!({
-            "step": end.step,
-            "seconds": end.seconds,
-            "eval_psnr": psnr,
-            "eval_ssim": ssim,
-            "views": views,
-        }))?;
+    let views = evaluate(args, &mut course, end, setup, session)?;
+    if let Ok(Some([psnr, ssim])) = views.as_ref().map(TestViews::means) {
+        let views = views.as_ref().map_or(0, TestViews::count);
         result["psnr"] = json!(psnr);
         result["ssim"] = json!(ssim);
         result["background"] = Value::from("black");
         result["views"] = json!(views);
         text = format!("PSNR {psnr:.3} dB, SSIM {ssim:.4} over {views} test views on black; {text}");
     }
+    let about = About { step: end.step, seconds: end.seconds, ..setup.about.clone() };
+    match report::after_training(&args.out, &about, views) {
+        Ok(page) => result["report"] = json!(page.display().to_string()),
+        Err(error) => session.remarks.warn(&format!("the training is saved, but {error:#}")),
+    }
     session.print(&result, &text)
 }
 
-fn all_views(mut judge: Judge<'_>, test: &[usize], session: &Session<'_>) -> Result<Option<Means>> {
-    let progress = Progress::new(session.remarks, "measuring");
-    let mut scores = Vec::with_capacity(test.len());
-    for (number, &index) in test.iter().enumerate() {
-        scores.push(judge.load_and_score(index)?.0);
-        progress.count(number + 1, test.len(), "test views");
+/// The scores of all test views, logged, or why there are none.
+fn evaluate(
+    args: &Train,
+    course: &mut Course<'_>,
+    end: &End,
+    setup: &Setup,
+    session: &Session<'_>,
+) -> Result<Result<TestViews, String>> {
+    let later = format!("`nerf report {}` renders them.", args.out.display());
+    let exam = course.exam.take();
+    let (Some(mut exam), false, false) = (exam, args.no_eval, end.interrupted) else {
+        return Ok(Err(match (setup.test.is_empty(), end.interrupted) {
+            (true, _) => "The training held out no test views.".to_owned(),
+            (_, true) => format!("The test views were not rendered, the training was interrupted; {later}"),
+            (_, false) => format!("The test views were not rendered, as asked for by --no-eval; {later}"),
+        }));
+    };
+    let clock = Instant::now();
+    let views = report::measure(&mut exam.judge, &setup.test, session.remarks)?;
+    if let Some([psnr, ssim]) = views.means() {
+        course.log.write(&json!({
+            "step": end.step,
+            "seconds": end.seconds,
+            "eval_psnr": psnr,
+            "eval_ssim": ssim,
+            "eval_seconds": clock.elapsed().as_secs_f64(),
+            "views": views.count(),
+        }))?;
     }
-    Ok(Means::of(&scores))
+    Ok(Ok(views))
 }

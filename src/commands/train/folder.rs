@@ -6,13 +6,13 @@ use crate::cli::Train;
 use anyhow::{Context, Result, bail};
 use nerf::checkpoint::{self, Checkpoint};
 use nerf::file::write_atomically;
+use nerf::report;
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
 const LOG: &str = "log.jsonl";
 const CONFIG: &str = "config.json";
-const REPORT: &str = "report.html";
 
 /// The folder.
 #[derive(Debug)]
@@ -52,7 +52,7 @@ impl RunFolder {
     /// Replaces or goes on with what an earlier training left; the configuration is written, and the log open.
     pub(super) fn begin(&self, setup: &Setup) -> Result<Log> {
         if setup.state.is_none() {
-            for name in [checkpoint::FILE, LOG, CONFIG, REPORT] {
+            for name in [checkpoint::FILE, LOG, CONFIG, report::FILE] {
                 remove(&self.path.join(name))?;
             }
         }

@@ -1,0 +1,90 @@
+//! The page about a training: one HTML file that needs neither network nor script.
+//!
+//! Data in, text out: the rows of `log.jsonl` ([`log`]), the scores of the test views and small pictures of some of
+//! them ([`views`], [`pictures`]) become curves, tables and images in one page.
+
+mod curves;
+pub mod log;
+mod page;
+pub mod pictures;
+mod time;
+pub mod views;
+
+use anyhow::Result;
+use log::Log;
+use std::time::SystemTime;
+use views::TestViews;
+
+/// The page's name in the folder of a training.
+pub const FILE: &str = "report.html";
+
+/// What is known about a training; everything may be missing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Facts {
+    /// The folder of the training.
+    pub run: String,
+    /// The dataset as it was named.
+    pub dataset: Option<String>,
+    /// When the checkpoint was written.
+    pub trained: Option<SystemTime>,
+    /// The adapter trained on.
+    pub adapter: Option<String>,
+    /// Steps taken.
+    pub steps: Option<u64>,
+    /// Seconds of training.
+    pub seconds: Option<f64>,
+    /// Whether the training has reached the end it was given.
+    pub is_done: Option<bool>,
+    /// Number of views trained on.
+    pub train_views: Option<usize>,
+    /// Whether the field holds linear light.
+    pub hdr: bool,
+    /// The resolved settings, as JSON.
+    pub settings: Option<String>,
+}
+
+/// A training to write about.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// What is known about it.
+    pub facts: Facts,
+    /// Its log.
+    pub log: Log,
+    /// Its test views, or why they are not shown.
+    pub views: Result<TestViews, String>,
+}
+
+impl Report {
+    /// The page.
+    ///
+    /// # Errors
+    /// When a chart cannot be drawn.
+    pub fn html(&self) -> Result<String> {
+        page::page(self)
+    }
+
+    /// PSNR in decibels, SSIM and number of all test views, of the field as it was left: as measured for this page,
+    /// else as logged at its last step.
+    #[must_use]
+    pub fn result(&self) -> Option<(f64, f64, u64)> {
+        let measured = self.views.as_ref().ok();
+        let measured = measured.and_then(|views| Some((views.means()?, views.count() as u64)));
+        let logged = || {
+            let row = self.log.result().filter(|row| self.steps().is_none_or(|steps| steps == row.step))?;
+            Some((row.eval_psnr?, row.eval_ssim?, row.views))
+        };
+        measured.map(|([psnr, ssim], count)| (psnr, ssim, count)).or_else(logged)
+    }
+
+    /// Steps taken.
+    #[must_use]
+    pub fn steps(&self) -> Option<u64> {
+        self.facts.steps.or_else(|| Some(self.log.steps.last()?.step))
+    }
+
+    /// Seconds of training.
+    #[must_use]
+    pub fn seconds(&self) -> Option<f64> {
+        self.facts.seconds.or_else(|| self.log.steps.last()?.seconds)
+    }
+}
