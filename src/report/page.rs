@@ -13,7 +13,7 @@ const STYLE: &str = include_str!("style.css");
 /// Size of a chart, in pixels; the page scales it.
 const CHART: [u32; 2] = [440, 280];
 /// TestViews that the table of scores shows unfolded.
-const UNFOLDED: usize = 30;
+const UNFOLDED: usize = 12;
 /// Pictures narrower than this are enlarged with sharp pixels.
 const SMALL: u32 = 160;
 
@@ -170,7 +170,7 @@ fn gallery(views: &TestViews, hdr: bool) -> Markup {
             @if shown.len() < views.count() {
                 "Shown are " (shown.len()) ": the " (WORST) " worst and " (EVENLY_SPACED) " evenly spaced ones, "
             } @else { "They are shown " }
-            "worst first, at most " (LONGEST_SIDE) " pixels wide and high; the scores are of the full size."
+            "worst first, at most " (LONGEST_SIDE) " pixels wide and high; the scores are of the full size. Select one to enlarge it."
             @if hdr { " Linear light is clamped to 0…1 and sRGB-encoded, for the pictures and for the scores." }
             @if !views.missing.is_empty() {
                 " " (views.missing.len()) (plural(views.missing.len() as u64, " view is", " views are"))
@@ -182,18 +182,19 @@ fn gallery(views: &TestViews, hdr: bool) -> Markup {
             span.bar { "0 " i style=(format!("background: linear-gradient(to right, {colors})")) {}
                 " " (ERROR_SCALE) " and more" }
         }
-        div.views { @for row in shown { (card(row)) } }
+        div.views { @for (number, row) in shown.into_iter().enumerate() { (card(number, row)) } }
     }
 }
 
-fn card(row: &Row) -> Markup {
+fn card(number: usize, row: &Row) -> Markup {
+    let id = format!("view-{number}");
     html! {
         @if let Some(pictures) = &row.pictures {
             @let [width, height] = pictures.size;
             @let pictures = [("rendering", &pictures.rendered), ("photo", &pictures.photo), ("error", &pictures.error)];
-            article {
+            article id=(id) {
                 h3 { span.name { (row.name) } span.score { (format!("{:.2} dB · SSIM {:.4}", row.psnr, row.ssim)) } }
-                div.trio {
+                a.trio href=(format!("#{id}")) {
                     @for (what, address) in pictures {
                         figure {
                             img class=[(width < SMALL).then_some("small")] src=(address) width=(width) height=(height)
