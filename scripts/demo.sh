@@ -43,13 +43,13 @@ rm -rf "$out/dataset" "$out/run" "$out/views"
 nerf=${CARGO_TARGET_DIR:-target}/release/nerf
 
 "$nerf" generate toys --out "$out/dataset"
-"$nerf" train "$out/dataset" --out "$out/run" --seconds "$seconds" --no-eval
-"$nerf" eval "$out/run" "$out/dataset"
+"$nerf" train "$out/dataset" --out "$out/run" --seconds "$seconds"
 "$nerf" render "$out/run" --out "$out/views" --orbit 24 --format png --format exr
 
 cat <<END
 
 dataset    $out/dataset
 training   $out/run (checkpoint.safetensors, config.json, log.jsonl)
+report     $out/run/report.html (open it in a browser: curves, test views, times)
 pictures   $out/views (0000.png, 0000.exr, …: 24 cameras around the scene)
 END
