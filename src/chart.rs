@@ -1,7 +1,7 @@
 //! Charts as SVG text: lines and points over linear or logarithmic axes, with a legend above the data.
 //!
 //! A picture stands alone (its ground is white) and scales with its `viewBox`. A page that inlines it may recolour
-//! it by its attributes: ground `#FFFFFF`, text [`INK`], axes [`AXIS`], grid [`GRID`].
+//! it by its attributes: the ground's fill is `#FFFFFF`, the grid's stroke `#E4E4E4`, that of the axes `#777777`.
 
 mod axis;
 
@@ -22,15 +22,9 @@ const PALETTE: [RGBColor; 7] = [
     RGBColor(0x56, 0xB4, 0xE9),
     RGBColor(0x88, 0x88, 0x88),
 ];
-/// The colour of text.
-pub const INK: &str = "#222222";
-/// The colour of axes.
-pub const AXIS: &str = "#777777";
-/// The colour of grid lines.
-pub const GRID: &str = "#E4E4E4";
-const INK_COLOR: RGBColor = RGBColor(0x22, 0x22, 0x22);
-const AXIS_COLOR: RGBColor = RGBColor(0x77, 0x77, 0x77);
-const GRID_COLOR: RGBColor = RGBColor(0xE4, 0xE4, 0xE4);
+const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
+const AXIS: RGBColor = RGBColor(0x77, 0x77, 0x77);
+const GRID: RGBColor = RGBColor(0xE4, 0xE4, 0xE4);
 
 /// Units per pixel: plotters draws at whole units, which are too coarse for curves.
 const FINE: u32 = 4;
@@ -187,8 +181,8 @@ impl Chart {
             .build_cartesian_2d(x, y)?;
         plot.configure_mesh()
             .max_light_lines(0)
-            .bold_line_style(GRID_COLOR.stroke_width(FINE))
-            .axis_style(AXIS_COLOR.stroke_width(FINE))
+            .bold_line_style(GRID.stroke_width(FINE))
+            .axis_style(AXIS.stroke_width(FINE))
             .label_style(style(TEXT, false))
             .axis_desc_style(style(TEXT, false))
             .set_all_tick_mark_size(px(3))
@@ -296,7 +290,7 @@ fn px(pixels: u32) -> i32 {
 /// Text of `size` pixels; plotters' own sizes are of another box.
 fn style(size: u32, bold: bool) -> TextStyle<'static> {
     let style = if bold { FontStyle::Bold } else { FontStyle::Normal };
-    FontDesc::new(FontFamily::SansSerif, f64::from(size * FINE) * 1.24, style).color(&INK_COLOR)
+    FontDesc::new(FontFamily::SansSerif, f64::from(size * FINE) * 1.24, style).color(&INK)
 }
 
 fn text_width(text: &str, size: u32) -> u32 {

@@ -112,7 +112,8 @@ pub fn depth_srgb8(depth: &[f32], view: &[[f32; 4]], [near, far]: [f32; 2]) -> V
     depth.iter().zip(view).map(pixel).collect()
 }
 
-fn quantised(value: f32) -> u8 {
+/// The 8 bits of a display-referred value in `[0, 1]`.
+pub(crate) fn quantised(value: f32) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 

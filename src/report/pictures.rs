@@ -1,5 +1,6 @@
 //! Small pictures of a view, as `data:` addresses: the rendering, the photo, and where they differ.
 
+use crate::picture::quantised;
 use anyhow::{Context, Result};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -117,10 +118,6 @@ fn heat(part: f32) -> [u8; 3] {
     let below = (place as usize).min(HEAT.len() - 2);
     let (a, b, t) = (HEAT[below], HEAT[below + 1], place - below as f32);
     std::array::from_fn(|i| (f32::from(a[i]) * (1.0 - t) + f32::from(b[i]) * t + 0.5) as u8)
-}
-
-fn quantised(value: f32) -> u8 {
-    (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
 #[cfg(test)]
