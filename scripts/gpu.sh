@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # One call on a GPU machine that has no toolchain: lists the adapters, runs the kernel tests, measures.
 # usage: OUT=FOLDER scripts/gpu.sh BINARIES [DATA]
-#   BINARIES  folder with nerf, step (benches/step.rs) and, if the kernels shall be tested, kernels (tests/kernels)
+#   BINARIES  folder with nerf, step (benches/step) and, if the kernels shall be tested, kernels (tests/kernels)
 #   DATA      folder with datasets [default: the scene toys is generated]
 # environment: NERF_ADAPTER, ROWS and BENCHES as for scripts/measure.sh
 set -euo pipefail

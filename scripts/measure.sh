@@ -6,7 +6,7 @@
 #   RESULTS   folder for the two files [default: benches/results]
 # environment:
 #   ROWS      what to train: "dataset:seconds …"
-#   BENCHES   presets of benches/step.rs
+#   BENCHES   presets of benches/step
 #   NERF_ADAPTER  what --adapter takes
 #   NERF, STEP    binaries to use instead of building them
 set -euo pipefail

@@ -8,6 +8,8 @@
 //! Three measurements: the start, in a process of its own with the driver's cache off; the throughput, as
 //! `nerf train` trains; and the time of each stage, with a wait after each step.
 
+mod report;
+
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Parser, ValueEnum};
 use nerf::camera::{Camera, Lens};
@@ -20,6 +22,7 @@ use nerf::kernels::{Needs, Plan};
 use nerf::model::{Layout, finest_resolution};
 use nerf::scene;
 use nerf::train::{StepStats, Trainer, Views};
+use report::{result, table};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -338,73 +341,4 @@ fn cpu_seconds() -> Option<f64> {
     let (_, fields) = stat.rsplit_once(')')?;
     let ticks = fields.split_whitespace().skip(11).take(2).map(|field| field.parse::<f64>().ok());
     Some(ticks.sum::<Option<f64>>()? / 100.0)
-}
-
-fn result(
-    args: &Args,
-    run: &Run,
-    start: Option<&Start>,
-    throughput: &Throughput,
-    stages: &[StageTime],
-) -> Value {
-    let (info, config) = (&run.gpu.info, &run.trainer.plan().config);
-    let dataset = args.dataset.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy());
-    json!({
-        "preset": args.config.to_possible_value().map(|value| value.get_name().to_owned()),
-        "config": config,
-        "dataset": dataset.unwrap_or_else(|| "toys, 100x100, generated".into()),
-        "adapter": info.name,
-        "driver": format!("{} {}", info.driver, info.driver_info).trim(),
-        "device_bytes": run.trainer.workspace().bytes(),
-        "cold_start": start,
-        "throughput": throughput,
-        "stages": stages,
-    })
-}
-
-fn table(result: &Value, start: Option<Start>, throughput: &Throughput, stages: &[StageTime]) -> String {
-    let word = |key: &str| result[key].as_str().unwrap_or_default().to_owned();
-    let mut lines = vec![
-        format!("config     {}", word("preset")),
-        format!("dataset    {}", word("dataset")),
-        format!("adapter    {} ({})", word("adapter"), word("driver")),
-        format!("memory     {} MiB on the device", result["device_bytes"].as_u64().unwrap_or(0) >> 20),
-    ];
-    lines.extend(start.map(|s| {
-        format!(
-            "cold start {:.2} s to the end of the first step: dataset {:.2}, device {:.2}, kernels {:.2}, \
-             warm-up {:.2}, step {:.3}",
-            s.seconds,
-            s.dataset_seconds,
-            s.device_seconds,
-            s.kernels_seconds,
-            s.warm_up_seconds,
-            s.first_step_seconds
-        )
-    }));
-    let Throughput { first_step, steps, seconds, samples, marched, rays, .. } = throughput;
-    let per_step = |count: &u64| count / u64::from((*steps).max(1));
-    lines.push(format!(
-        "steps      {first_step} to {} in {seconds:.1} s: {:.1} ms each with {} rays, {} marched and {} kept \
-         samples",
-        first_step + steps,
-        1e3 * seconds / f64::from((*steps).max(1)),
-        per_step(rays),
-        per_step(marched),
-        per_step(samples),
-    ));
-    lines.push(format!("samples/s  {:.0} kept, by the clock", throughput.samples_per_second));
-    lines.extend(
-        throughput
-            .samples_per_second_of_two_cores
-            .map(|rate| format!("samples/s  {rate:.0} kept, by CPU time on two cores")),
-    );
-    if !stages.is_empty() {
-        lines.push(format!("\n{:40} {:>9} {:>10} {:>7}", "stage", "ms/step", "ns/sample", "share"));
-    }
-    lines.extend(stages.iter().map(|s| {
-        let share = 100.0 * s.share;
-        format!("{:40} {:9.2} {:10.1} {share:6.1}%", s.stage, s.ms_per_step, s.ns_per_sample)
-    }));
-    lines.join("\n")
 }
