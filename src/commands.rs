@@ -2,6 +2,7 @@
 
 mod adapters;
 mod eval;
+mod exam;
 mod field;
 mod generate;
 mod render;

@@ -3,26 +3,25 @@
 mod course;
 mod folder;
 mod log;
-mod setup;
-mod stages;
+pub(super) mod pace;
+pub(super) mod setup;
+pub(super) mod stages;
 
-use super::scores::Judge;
+use super::exam::Exam;
 use super::{Session, report, writable_folder};
 use crate::cli::Train;
 use crate::progress::{Progress, duration};
 use anyhow::Result;
-use course::{Course, End, Exam};
+use course::{Course, End};
 use folder::RunFolder;
 use nerf::checkpoint::About;
 use nerf::dataset::{Dataset, OpenOptions};
-use nerf::gpu::Gpu;
-use nerf::picture::ColorSpace;
-use nerf::render::Renderer;
 use nerf::report::views::TestViews;
+use nerf::schedule::Budget;
 use nerf::train::{Trainer, Views};
+use pace::Pace;
 use serde_json::{Value, json};
-use setup::Setup;
-use std::sync::Arc;
+use setup::{Setup, Wishes};
 use std::time::Instant;
 
 /// Views that `--eval-every` looks at.
@@ -34,7 +33,16 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let dataset = Dataset::open(&args.dataset, &options)?;
     session.remarks.notes(&dataset);
     let gpu = session.open_gpu()?;
-    let setup = Setup::new(args, &dataset, &gpu, folder.checkpoint.take())?;
+    let wishes = Wishes {
+        dataset: &args.dataset.display().to_string(),
+        config: args.config.as_deref(),
+        set: &args.set,
+        seed: args.seed,
+        background: args.background,
+        deterministic: args.deterministic,
+        budget: Budget { steps: args.steps, seconds: args.seconds },
+    };
+    let setup = Setup::new(&wishes, &dataset, &gpu, folder.checkpoint.take())?;
     setup.describe(&dataset, &gpu, session.remarks);
     writable_folder(&args.out)?;
     let clock = Instant::now();
@@ -52,7 +60,11 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     if let Some(state) = &setup.state {
         trainer.restore(state)?;
     }
-    let exam = exam(args, &setup, &trainer, &dataset, &gpu)?;
+    let mut exam = None;
+    if !args.no_eval || args.eval_every.is_some() {
+        let few = if args.eval_every.is_some() { FEW_VIEWS } else { 0 };
+        exam = Exam::new(&gpu, &setup, trainer.workspace(), &dataset, few)?;
+    }
     let compile_seconds = clock.elapsed().as_secs_f64();
     let mut log = folder.begin(&setup)?;
     log.write(&json!({
@@ -64,34 +76,12 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         "load_seconds": load_seconds,
         "compile_seconds": compile_seconds,
     }))?;
-    let mut course = Course::new(&setup.about, trainer, log, folder.checkpoint_path(), session.remarks);
-    course.exam = exam;
+    // A deterministic training's checkpoint does not tell how long it took.
+    let pace = Pace::new(&setup.about, trainer, setup.about.seconds.max(log.seconds));
+    let mut course = Course::new(&setup.about, pace, log, folder.checkpoint_path(), session.remarks);
+    (course.exam, course.eval_every) = (exam, args.eval_every);
     let end = course.run()?;
     finish(args, course, &end, &setup, session)
-}
-
-/// Renders test views while training or afterwards, if there are any and somebody wants to know.
-fn exam<'a>(
-    args: &Train,
-    setup: &Setup,
-    trainer: &Trainer,
-    dataset: &'a Dataset,
-    gpu: &Arc<Gpu>,
-) -> Result<Option<Exam<'a>>> {
-    if setup.test.is_empty() || (args.no_eval && args.eval_every.is_none()) {
-        return Ok(None);
-    }
-    let needs = &setup.about.needs;
-    let renderer = Renderer::new(gpu, &setup.plan, trainer.workspace(), &setup.about.bounds, needs.lens)?;
-    let color_space = ColorSpace::of(needs.hdr);
-    let judge = Judge { renderer, color_space, background: [0.0; 3], dataset };
-    let mut few = Vec::new();
-    if args.eval_every.is_some() {
-        let count = setup.test.len().min(FEW_VIEWS);
-        few = (0..count).map(|i| setup.test[i * setup.test.len() / count]).collect();
-    }
-    let images = dataset.load_images(&few, &|_| {})?;
-    Ok(Some(Exam { judge, every: args.eval_every, few: few.into_iter().zip(images).collect() }))
 }
 
 /// Measures all test views, unless the training was interrupted, writes the report and prints the result.
@@ -156,7 +146,7 @@ fn evaluate(
         }));
     };
     let clock = Instant::now();
-    let views = report::measure(&mut exam.judge, &setup.test, session.remarks)?;
+    let views = report::measure(&mut exam.judge, &exam.test, session.remarks)?;
     if let Some([psnr, ssim]) = views.means() {
         course.log.write(&json!({
             "step": end.step,

@@ -1,25 +1,20 @@
 //! The course of a training: blocks of steps, and between them reports, measurements and checkpoints.
 
 use super::log::Log;
-use super::stages::StageTimes;
-use crate::commands::scores::{Judge, Means};
+use super::pace::{Block, Pace};
+use crate::commands::exam::Exam;
+use crate::commands::scores::Means;
 use crate::progress::{Progress, duration, short};
 use crate::remarks::Remarks;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow};
 use nerf::checkpoint::{About, Checkpoint};
-use nerf::image::Image;
 use nerf::metrics::PSNR_CAP_DB;
-use nerf::train::{StepStats, Trainer};
+use nerf::schedule::Budget;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
-/// Steps between reports, each of which waits for the device.
-const BLOCK: u32 = 16;
-/// A training ends when so many steps in a row had gradients that could not be used.
-const MOST_SKIPPED: u32 = 16;
 /// Seconds of training between checkpoints.
 const BETWEEN_CHECKPOINTS: f64 = 60.0;
 
@@ -27,35 +22,21 @@ const BETWEEN_CHECKPOINTS: f64 = 60.0;
 #[derive(Debug)]
 pub(super) struct Course<'a> {
     about: &'a About,
-    trainer: Trainer,
+    pace: Pace,
     /// Where the rows go.
     pub(super) log: Log,
     checkpoint: PathBuf,
     /// Measures test views.
     pub(super) exam: Option<Exam<'a>>,
+    /// Steps between measurements.
+    pub(super) eval_every: Option<u32>,
     remarks: Remarks,
-    /// Seconds of training so far.
-    seconds: f64,
     /// Step and seconds at the beginning of this run.
     start: (u32, f64),
     /// Step and seconds of the newest checkpoint; step 0 when there is none.
     saved: (u32, f64),
     loss: Option<f64>,
     is_empty: bool,
-    /// Skipped steps, and how many of them came last.
-    skipped: (u32, u32),
-    stages: StageTimes,
-}
-
-/// Measures a few test views every so many steps.
-#[derive(Debug)]
-pub(super) struct Exam<'a> {
-    /// Renders and compares.
-    pub(super) judge: Judge<'a>,
-    /// Steps between measurements.
-    pub(super) every: Option<u32>,
-    /// The frames and their photos.
-    pub(super) few: Vec<(usize, Image)>,
 }
 
 /// How a training ended.
@@ -75,31 +56,20 @@ pub(super) struct End {
 
 impl<'a> Course<'a> {
     /// A training that stands where `about` says.
-    pub(super) fn new(
-        about: &'a About,
-        trainer: Trainer,
-        log: Log,
-        checkpoint: PathBuf,
-        remarks: Remarks,
-    ) -> Self {
-        // A deterministic training's checkpoint does not tell.
-        let seconds = about.seconds.max(log.seconds);
-        let start = (about.step, seconds);
-        let stages = StageTimes::new(trainer.gpu());
+    pub(super) fn new(about: &'a About, pace: Pace, log: Log, checkpoint: PathBuf, remarks: Remarks) -> Self {
+        let start = (pace.steps(), pace.seconds());
         Self {
             about,
-            trainer,
+            pace,
             log,
             checkpoint,
             exam: None,
+            eval_every: None,
             remarks,
-            seconds,
             start,
             saved: start,
             loss: None,
             is_empty: false,
-            skipped: (0, 0),
-            stages,
         }
     }
 
@@ -107,75 +77,33 @@ impl<'a> Course<'a> {
     pub(super) fn run(&mut self) -> Result<End> {
         let stop = stop_on_interrupt()?;
         let progress = Progress::new(self.remarks, "training");
-        let budget = self.about.budget;
-        let mut seconds_per_step = 0.0;
-        while !budget.is_spent(self.trainer.steps(), self.seconds) && !stop.load(Ordering::Relaxed) {
-            let before = (self.trainer.steps(), self.seconds);
-            let stats = self.block(seconds_per_step)?;
-            let taken = self.trainer.steps() - before.0;
-            let elapsed = self.seconds - before.1;
-            seconds_per_step = elapsed / f64::from(taken.max(1));
-            self.record(&stats, elapsed, &progress)?;
+        while !self.pace.is_over() && !stop.load(Ordering::Relaxed) {
+            let step = self.pace.steps();
+            let pause = Budget {
+                steps: self.eval_every.map(|every| (step - step % every).saturating_add(every)),
+                seconds: None,
+            };
+            let block = self.pace.block(pause).map_err(|error| anyhow!("{error:#}; {}", self.kept()))?;
+            self.record(&block, &progress)?;
             self.measure_if_due(&progress)?;
-            if self.seconds - self.saved.1 >= BETWEEN_CHECKPOINTS {
+            if self.pace.seconds() - self.saved.1 >= BETWEEN_CHECKPOINTS {
                 self.save()?;
             }
         }
         self.save()?;
-        let step = self.trainer.steps();
-        if let Some(row) = self.stages.row(step) {
-            self.log.write(&row)?;
+        let (step, seconds) = (self.pace.steps(), self.pace.seconds());
+        let stages = self.pace.stages.per_step();
+        if !stages.is_empty() {
+            let steps = self.pace.stages.steps();
+            self.log.write(&json!({ "event": "stages", "step": step, "steps": steps, "stages": stages }))?;
         }
-        let interrupted = !budget.is_spent(step, self.seconds);
-        Ok(End { step, seconds: self.seconds, loss: self.loss, skipped: self.skipped.0, interrupted })
-    }
-
-    /// Takes up to [`BLOCK`] steps and waits for them.
-    fn block(&mut self, seconds_per_step: f64) -> Result<StepStats> {
-        let (budget, optimizer) = (self.about.budget, &self.about.config.optimizer);
-        let first = self.trainer.steps();
-        let mut count = budget.block(first, self.seconds, seconds_per_step, BLOCK);
-        if let Some(every) = self.exam.as_ref().and_then(|exam| exam.every) {
-            count = count.min(every - first % every);
-        }
-        let mut stages = self.stages.of_block(first / BLOCK);
-        let clock = Instant::now();
-        for step in first..first + count {
-            let seconds = self.seconds + clock.elapsed().as_secs_f64();
-            let timer = stages.as_mut().and_then(|stages| stages.of_step());
-            self.trainer.step(budget.learning_rate(optimizer, step, seconds), timer)?;
-        }
-        let stats = self.trainer.report()?;
-        self.seconds += clock.elapsed().as_secs_f64();
-        self.check(&stats)?;
-        Ok(stats)
-    }
-
-    /// Ends a training that leads nowhere any more.
-    fn check(&mut self, stats: &StepStats) -> Result<()> {
-        let in_a_row = if stats.skipped == stats.steps { self.skipped.1 + stats.skipped } else { 0 };
-        self.skipped = (self.skipped.0 + stats.skipped, in_a_row);
-        let found = match stats.loss {
-            _ if in_a_row >= MOST_SKIPPED => {
-                format!("the gradients of the last {in_a_row} steps were not finite or far too large")
-            }
-            loss if !(loss.is_finite() && stats.color_error.is_finite()) => {
-                format!("the loss is not finite any more ({loss})")
-            }
-            _ => return Ok(()),
-        };
-        bail!(
-            "{found} at step {}: the training diverged; start again with a smaller optimizer.learning_rate ({} was \
-             used); {}",
-            self.trainer.steps(),
-            self.about.config.optimizer.learning_rate,
-            self.kept()
-        )
+        let skipped = self.pace.skipped();
+        Ok(End { step, seconds, loss: self.loss, skipped, interrupted: !self.pace.is_over() })
     }
 
     /// Logs a block and shows how far the training is.
-    fn record(&mut self, stats: &StepStats, elapsed: f64, progress: &Progress) -> Result<()> {
-        let (step, seconds, budget) = (self.trainer.steps(), self.seconds, self.about.budget);
+    fn record(&mut self, block: &Block, progress: &Progress) -> Result<()> {
+        let (step, seconds, stats) = (self.pace.steps(), self.pace.seconds(), &block.stats);
         let psnr = (-10.0 * stats.color_error.log10()).min(PSNR_CAP_DB);
         self.loss = Some(stats.loss);
         if stats.samples == 0 && !self.is_empty {
@@ -185,7 +113,7 @@ impl<'a> Course<'a> {
             ));
         }
         self.is_empty = stats.samples == 0;
-        if stats.skipped > 0 && self.skipped.0 == stats.skipped {
+        if stats.skipped > 0 && self.pace.skipped() == stats.skipped {
             progress.say(&format!(
                 "warning: up to step {step}, {} steps were skipped: their gradients were not finite or far too large; \
                  if it goes on, try a smaller optimizer.learning_rate",
@@ -201,12 +129,12 @@ impl<'a> Course<'a> {
             "samples": stats.samples,
             "marched": stats.marched,
             "skipped": stats.skipped,
-            "learning_rate": budget.learning_rate(&self.about.config.optimizer, step, seconds),
+            "learning_rate": self.pace.learning_rate(),
         }))?;
-        let spent = budget.spent(step, seconds);
+        let spent = self.pace.spent();
         progress.update(spent, || {
-            let per_second = |count: u64| short(count as f64 / elapsed.max(1e-9));
-            let earlier = budget.spent(self.start.0, self.start.1);
+            let per_second = |count: u64| short(count as f64 / block.seconds.max(1e-9));
+            let earlier = self.about.budget.spent(self.start.0, self.start.1);
             let remaining = (seconds - self.start.1) * (1.0 - spent) / (spent - earlier).max(1e-9);
             format!(
                 "step {step}, loss {:.5}, PSNR {psnr:.2} dB, {} rays/s, {} samples/s, {}, {} to go",
@@ -221,30 +149,26 @@ impl<'a> Course<'a> {
     }
 
     fn measure_if_due(&mut self, progress: &Progress) -> Result<()> {
-        let step = self.trainer.steps();
+        let step = self.pace.steps();
         let Some(exam) = &mut self.exam else { return Ok(()) };
-        if exam.every.is_none_or(|every| !step.is_multiple_of(every)) {
+        if self.eval_every.is_none_or(|every| !step.is_multiple_of(every)) {
             return Ok(());
         }
-        let mut scores = Vec::new();
-        for (index, image) in &exam.few {
-            scores.push(exam.judge.score(*index, image)?.0);
-        }
-        let Some(Means { psnr, views, .. }) = Means::of(&scores) else { return Ok(()) };
+        let Some(Means { psnr, views, .. }) = exam.few()? else { return Ok(()) };
         progress.say(&format!("step {step}: PSNR {psnr:.2} dB over {views} test views"));
-        let row = json!({ "step": step, "seconds": self.seconds, "eval_psnr": psnr, "views": views });
+        let row = json!({ "step": step, "seconds": self.pace.seconds(), "eval_psnr": psnr, "views": views });
         self.log.write(&row)
     }
 
     fn save(&mut self) -> Result<()> {
-        let state = self.trainer.state()?;
+        let state = self.pace.trainer.state()?;
         let (step, rays) = (state.step, state.rays);
         // No two runs take the same time; the log has it.
-        let seconds = if self.about.config.deterministic { 0.0 } else { self.seconds };
+        let seconds = if self.about.config.deterministic { 0.0 } else { self.pace.seconds() };
         let about = About { step, rays, seconds, ..self.about.clone() };
         let checkpoint = Checkpoint { about, state };
         checkpoint.save(&self.checkpoint).with_context(|| format!("at step {step} ({})", self.kept()))?;
-        self.saved = (step, self.seconds);
+        self.saved = (step, self.pace.seconds());
         Ok(())
     }
 

@@ -1,6 +1,5 @@
 //! What is trained, on what, and for how long: the command line, the dataset and an earlier training together.
 
-use crate::cli::Train;
 use crate::commands::find_frames;
 use crate::progress::{duration, short};
 use crate::remarks::Remarks;
@@ -16,48 +15,68 @@ use nerf::model::finest_resolution;
 use nerf::orbit::Orbit;
 use nerf::schedule::Budget;
 use nerf::train::State;
+use std::path::Path;
 
 /// Seconds of training on a CPU when nothing is said.
 const CPU_SECONDS: f64 = 300.0;
 /// Steps on a GPU when nothing is said.
 const GPU_STEPS: u32 = 20_000;
 
+/// What somebody wants to train, and for how long.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::commands) struct Wishes<'a> {
+    /// The dataset's path, as it was given.
+    pub(in crate::commands) dataset: &'a str,
+    /// A file with settings.
+    pub(in crate::commands) config: Option<&'a Path>,
+    /// Single settings, `key.path=value`.
+    pub(in crate::commands) set: &'a [String],
+    /// The seed.
+    pub(in crate::commands) seed: Option<u32>,
+    /// What lies behind transparent photos.
+    pub(in crate::commands) background: Option<Background>,
+    /// The same checkpoint bit for bit.
+    pub(in crate::commands) deterministic: bool,
+    /// The end, if one is given.
+    pub(in crate::commands) budget: Budget,
+}
+
 /// A training that can begin.
 #[derive(Debug)]
-pub(super) struct Setup {
+pub(in crate::commands) struct Setup {
     /// What its checkpoints say, at the first step of this run.
-    pub(super) about: About,
+    pub(in crate::commands) about: About,
     /// How the kernels are linked.
-    pub(super) plan: Plan,
+    pub(in crate::commands) plan: Plan,
     /// Where an earlier run ended.
-    pub(super) state: Option<State>,
+    pub(in crate::commands) state: Option<State>,
     /// Frames to train on.
-    pub(super) train: Vec<usize>,
+    pub(in crate::commands) train: Vec<usize>,
     /// Frames to measure on.
-    pub(super) test: Vec<usize>,
+    pub(in crate::commands) test: Vec<usize>,
     /// The cameras to train on.
-    pub(super) cameras: Vec<Camera>,
+    pub(in crate::commands) cameras: Vec<Camera>,
 }
 
 impl Setup {
     /// A new training, or the one that `resumed` holds.
-    pub(super) fn new(
-        args: &Train,
+    pub(in crate::commands) fn new(
+        wishes: &Wishes<'_>,
         dataset: &Dataset,
         gpu: &Gpu,
         resumed: Option<Checkpoint>,
     ) -> Result<Self> {
         ensure!(!dataset.train.is_empty(), "the dataset has no frame to train on");
         let (mut about, state, train, test) = match resumed {
-            None => (first(args, dataset, gpu)?, None, dataset.train.clone(), dataset.test.clone()),
+            None => (first(wishes, dataset, gpu)?, None, dataset.train.clone(), dataset.test.clone()),
             Some(Checkpoint { about, state }) => {
                 let (train, test) = same_frames(&about, dataset)?;
-                (again(args, about)?, Some(state), train, test)
+                (again(wishes, about)?, Some(state), train, test)
             }
         };
-        about.dataset = args.dataset.display().to_string();
+        about.dataset = wishes.dataset.to_owned();
         about.adapter.clone_from(&gpu.info.name);
-        about.budget = budget(args, gpu, state.as_ref().map(|_| about.budget));
+        about.budget = budget(wishes, gpu, state.as_ref().map(|_| about.budget));
         about.budget.validate()?;
         ensure!(
             !about.config.deterministic || about.budget.seconds.is_none(),
@@ -70,7 +89,7 @@ impl Setup {
     }
 
     /// Says what was chosen, and what was left out.
-    pub(super) fn describe(&self, dataset: &Dataset, gpu: &Gpu, remarks: Remarks) {
+    pub(in crate::commands) fn describe(&self, dataset: &Dataset, gpu: &Gpu, remarks: Remarks) {
         let About { config, budget, bounds, .. } = &self.about;
         remarks.say(&format!("{} views to train on, {} to measure on", self.train.len(), self.test.len()));
         remarks.detail(&format!(
@@ -97,7 +116,7 @@ impl Setup {
     }
 
     /// The parts that the scene does not need.
-    pub(super) fn left_out(&self, dataset: &Dataset) -> Vec<&'static str> {
+    pub(in crate::commands) fn left_out(&self, dataset: &Dataset) -> Vec<&'static str> {
         let needs = &self.plan.needs;
         let parts = [
             (!needs.lens, "lens model (all cameras are pinholes)"),
@@ -116,24 +135,24 @@ fn cameras(dataset: &Dataset, indices: &[usize]) -> Vec<Camera> {
 }
 
 /// The settings: those of `config`, the file, single values, flags.
-fn configure(mut config: Config, args: &Train) -> Result<Config> {
-    if let Some(path) = &args.config {
+fn configure(mut config: Config, wishes: &Wishes<'_>) -> Result<Config> {
+    if let Some(path) = wishes.config {
         config.merge_file(path)?;
     }
-    for assignment in &args.set {
+    for assignment in wishes.set {
         config.set(assignment)?;
     }
-    config.seed = args.seed.unwrap_or(config.seed);
-    config.background = args.background.unwrap_or(config.background);
-    config.deterministic |= args.deterministic;
+    config.seed = wishes.seed.unwrap_or(config.seed);
+    config.background = wishes.background.unwrap_or(config.background);
+    config.deterministic |= wishes.deterministic;
     config.validate()?;
     Ok(config)
 }
 
-fn first(args: &Train, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
+fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
     let bounds = dataset.bounds.clone();
     let defaults = if gpu.is_cpu() { Config::for_cpu(bounds.cascades > 1)? } else { Config::default() };
-    let mut config = configure(defaults, args)?;
+    let mut config = configure(defaults, wishes)?;
     let cameras = cameras(dataset, &dataset.train);
     if config.grid.finest == 0 {
         config.grid.finest = finest_resolution(config.grid.base, &bounds, &cameras);
@@ -166,8 +185,8 @@ fn first(args: &Train, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
 }
 
 /// The description of an earlier training with what the command line changes; the field's size stays.
-fn again(args: &Train, mut about: About) -> Result<About> {
-    let config = configure(about.config.clone(), args)?;
+fn again(wishes: &Wishes<'_>, mut about: About) -> Result<About> {
+    let config = configure(about.config.clone(), wishes)?;
     let changed = About { config, ..about.clone() };
     ensure!(
         changed.layout() == about.layout() && changed.config.occupancy.cells == about.config.occupancy.cells,
@@ -207,11 +226,10 @@ fn same_frames(about: &About, dataset: &Dataset) -> Result<(Vec<usize>, Vec<usiz
 }
 
 /// The end asked for, else that of the earlier run, else one that suits the adapter.
-fn budget(args: &Train, gpu: &Gpu, earlier: Option<Budget>) -> Budget {
-    let asked = Budget { steps: args.steps, seconds: args.seconds };
+fn budget(wishes: &Wishes<'_>, gpu: &Gpu, earlier: Option<Budget>) -> Budget {
     let suitable = match gpu.is_cpu() {
         true => Budget { steps: None, seconds: Some(CPU_SECONDS) },
         false => Budget { steps: Some(GPU_STEPS), seconds: None },
     };
-    if asked == Budget::default() { earlier.unwrap_or(suitable) } else { asked }
+    if wishes.budget == Budget::default() { earlier.unwrap_or(suitable) } else { wishes.budget }
 }

@@ -2,14 +2,23 @@
 
 use nerf::gpu::Gpu;
 use nerf::gpu::timer::Timer;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// Of so many blocks, one is timed: its steps wait for the device each, which costs a little.
 const BLOCKS_PER_TIMED: u32 = 16;
 
+/// The time of a stage.
+#[derive(Clone, Debug, Serialize)]
+pub(in crate::commands) struct StageTime {
+    /// Its name.
+    stage: String,
+    /// Milliseconds per step.
+    ms: f64,
+}
+
 /// Times the stages of some steps.
 #[derive(Debug)]
-pub(super) struct StageTimes {
+pub(in crate::commands) struct StageTimes {
     /// `None` where the adapter has no timestamps.
     timer: Option<Timer>,
     steps: u32,
@@ -17,31 +26,35 @@ pub(super) struct StageTimes {
 
 impl StageTimes {
     /// Nothing was timed yet.
-    pub(super) fn new(gpu: &Gpu) -> Self {
+    pub(in crate::commands) fn new(gpu: &Gpu) -> Self {
         Self { timer: Timer::new(gpu).ok(), steps: 0 }
     }
 
     /// The timer for the steps of a block, if it is to be timed. Not the first one: an untrained field fills
     /// the whole box.
-    pub(super) fn of_block(&mut self, block: u32) -> Option<&mut Self> {
+    pub(in crate::commands) fn of_block(&mut self, block: u32) -> Option<&mut Self> {
         (self.timer.is_some() && block % BLOCKS_PER_TIMED == 1).then_some(self)
     }
 
     /// The timer for one step.
-    pub(super) fn of_step(&mut self) -> Option<&mut Timer> {
+    pub(in crate::commands) fn of_step(&mut self) -> Option<&mut Timer> {
         self.steps += 1;
         self.timer.as_mut()
     }
 
-    /// The row of the log: milliseconds per step of each stage, the longest first. `None` when nothing was timed.
-    pub(super) fn row(&self, step: u32) -> Option<Value> {
-        let timer = self.timer.as_ref().filter(|_| self.steps > 0)?;
-        let mut stages: Vec<_> = timer.totals().iter().collect();
+    /// Steps that were timed.
+    pub(in crate::commands) fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Each stage's time, the longest first; none when nothing was timed.
+    pub(in crate::commands) fn per_step(&self) -> Vec<StageTime> {
+        let timer = self.timer.as_ref().filter(|_| self.steps > 0);
+        let per_step = 1e3 / f64::from(self.steps.max(1));
+        let mut stages: Vec<_> = timer.iter().flat_map(|timer| timer.totals()).collect();
         stages.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-        let per_step = 1e3 / f64::from(self.steps);
-        let stages: Vec<_> = (stages.into_iter())
-            .map(|(stage, seconds)| json!({ "stage": stage, "ms": seconds * per_step }))
-            .collect();
-        Some(json!({ "event": "stages", "step": step, "steps": self.steps, "stages": stages }))
+        let time =
+            |(stage, seconds): (&String, &f64)| StageTime { stage: stage.clone(), ms: seconds * per_step };
+        stages.into_iter().map(time).collect()
     }
 }

@@ -1,0 +1,83 @@
+//! Measuring test views: a few of them while training, all of them at the end.
+
+use super::scores::{Judge, Means, Score};
+use super::train::setup::Setup;
+use crate::progress::Progress;
+use crate::remarks::Remarks;
+use anyhow::Result;
+use nerf::dataset::Dataset;
+use nerf::gpu::Gpu;
+use nerf::image::Image;
+use nerf::kernels::Workspace;
+use nerf::picture::ColorSpace;
+use nerf::render::Renderer;
+use std::sync::Arc;
+
+/// Renders test views of a field in training and compares them, on black.
+#[derive(Debug)]
+pub(super) struct Exam<'a> {
+    /// Renders and compares.
+    pub(super) judge: Judge<'a>,
+    /// All test frames.
+    pub(super) test: Vec<usize>,
+    /// Some of them, evenly spaced, with their photos.
+    few: Vec<(usize, Image)>,
+}
+
+/// The scores of all test views, and of the few among them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Marks {
+    /// Of all views.
+    pub(super) all: Means,
+    /// Of those that were measured while training; `None` if there are none.
+    pub(super) few: Option<Means>,
+}
+
+impl<'a> Exam<'a> {
+    /// A renderer of the field in `workspace`, and the photos of up to `few` views. `None` without test views.
+    pub(super) fn new(
+        gpu: &Arc<Gpu>,
+        setup: &Setup,
+        workspace: &Workspace,
+        dataset: &'a Dataset,
+        few: usize,
+    ) -> Result<Option<Self>> {
+        if setup.test.is_empty() {
+            return Ok(None);
+        }
+        let needs = &setup.about.needs;
+        let renderer = Renderer::new(gpu, &setup.plan, workspace, &setup.about.bounds, needs.lens)?;
+        let color_space = ColorSpace::of(needs.hdr);
+        let judge = Judge { renderer, color_space, background: [0.0; 3], dataset };
+        let count = setup.test.len().min(few);
+        let few: Vec<_> = (0..count).map(|i| setup.test[i * setup.test.len() / count]).collect();
+        let images = dataset.load_images(&few, &|_| {})?;
+        let few = few.into_iter().zip(images).collect();
+        Ok(Some(Self { judge, test: setup.test.clone(), few }))
+    }
+
+    /// Measures the few; `None` if there are none.
+    pub(super) fn few(&mut self) -> Result<Option<Means>> {
+        let mut scores = Vec::with_capacity(self.few.len());
+        for (index, image) in &self.few {
+            scores.push(self.judge.score(*index, image)?.0);
+        }
+        Ok(Means::of(&scores))
+    }
+
+    /// Measures all.
+    pub(super) fn all(&mut self, remarks: Remarks) -> Result<Option<Marks>> {
+        let progress = Progress::new(remarks, "measuring");
+        let mut scores = Vec::with_capacity(self.test.len());
+        for (number, &index) in self.test.iter().enumerate() {
+            scores.push(self.judge.load_and_score(index)?.0);
+            progress.count(number + 1, self.test.len(), "test views");
+        }
+        let is_one_of_few = |index: &usize| self.few.iter().any(|(few, _)| few == index);
+        let few: Vec<Score> = (self.test.iter().zip(&scores))
+            .filter(|(index, _)| is_one_of_few(index))
+            .map(|(_, score)| score.clone())
+            .collect();
+        Ok(Means::of(&scores).map(|all| Marks { all, few: Means::of(&few) }))
+    }
+}
