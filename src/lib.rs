@@ -71,6 +71,7 @@ pub mod metrics;
 pub mod model;
 pub mod orbit;
 pub mod picture;
+pub mod quadrature;
 pub mod reference;
 pub mod render;
 pub mod report;
