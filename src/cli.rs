@@ -1,5 +1,7 @@
 //! The command line: types only. Their doc comments are the help.
 
+pub(crate) mod bench;
+
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::config::Background;
 use nerf::dataset::{HoldOut, Split};
@@ -51,6 +53,9 @@ pub(crate) enum Command {
     Report(Report),
     /// Write an analytic scene with exact ground truth as a dataset
     Generate(Generate),
+    /// Measure error against run time
+    #[command(subcommand)]
+    Bench(bench::Bench),
     /// List the adapters of this machine
     Adapters,
 }

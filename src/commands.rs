@@ -1,6 +1,7 @@
 //! One file per subcommand: glue, printing and progress around the library.
 
 mod adapters;
+mod bench;
 mod eval;
 mod exam;
 mod field;
@@ -30,6 +31,7 @@ pub(crate) fn run(cli: &Cli) -> Result<()> {
         Command::Eval(args) => eval::run(args, &session),
         Command::Report(args) => report::run(args, &session),
         Command::Generate(args) => generate::run(args, &session),
+        Command::Bench(what) => bench::run(what, &session),
         Command::Adapters => adapters::run(&session),
     }
 }

@@ -28,7 +28,12 @@ pub(crate) fn result(
 }
 
 /// Lines for readers.
-pub(crate) fn table(result: &Value, start: Option<Start>, throughput: &Throughput, stages: &[StageTime]) -> String {
+pub(crate) fn table(
+    result: &Value,
+    start: Option<Start>,
+    throughput: &Throughput,
+    stages: &[StageTime],
+) -> String {
     let word = |key: &str| result[key].as_str().unwrap_or_default().to_owned();
     let mut lines = vec![
         format!("config     {}", word("preset")),

@@ -1,0 +1,251 @@
+//! `nerf bench training`: PSNR of test views against seconds of training.
+
+mod curve;
+mod picture;
+
+use super::{circumstances, joined, markdown, optional, quoted, write_csv, write_json, write_text};
+use crate::cli::bench::Training;
+use crate::commands::exam::Exam;
+use crate::commands::train::pace::Pace;
+use crate::commands::train::setup::{Setup, Wishes};
+use crate::commands::{Session, writable_folder};
+use crate::progress::{Progress, short};
+use anyhow::{Context, Result, ensure};
+use curve::{Curve, follow};
+use nerf::dataset::{Dataset, OpenOptions};
+use nerf::gpu::Gpu;
+use nerf::image::Image;
+use nerf::schedule::Budget;
+use nerf::train::{Trainer, Views};
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// One training to be measured.
+struct Entry {
+    /// The stem of its config's file.
+    config: String,
+    setup: Setup,
+}
+
+/// One training that was measured.
+#[derive(Serialize)]
+struct Run {
+    config: String,
+    seed: u32,
+    /// Building kernels and buffers, and running each kernel once.
+    compile_seconds: f64,
+    /// Rendering and comparing test views, along the way and at the end.
+    evaluate_seconds: f64,
+    #[serde(flatten)]
+    curve: Curve,
+    /// All settings.
+    settings: nerf::config::Config,
+}
+
+/// What is the same in all runs.
+struct Course<'a> {
+    gpu: Arc<Gpu>,
+    dataset: &'a Dataset,
+    images: Vec<Image>,
+    views: usize,
+}
+
+pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
+    let clock = Instant::now();
+    let dataset = Dataset::open(&args.dataset, &OpenOptions::default())?;
+    session.remarks.notes(&dataset);
+    ensure!(!dataset.test.is_empty(), "the dataset has no test views to measure; a benchmark needs some");
+    let gpu = session.open_gpu()?;
+    let entries = entries(args, &dataset, &gpu)?;
+    writable_folder(&args.out)?;
+    let images = {
+        let progress = Progress::new(session.remarks, "loading");
+        let count = dataset.train.len();
+        dataset.load_images(&dataset.train, &|done| progress.count(done, count, "images"))?
+    };
+    let load_seconds = clock.elapsed().as_secs_f64();
+    let course = Course { gpu, dataset: &dataset, images, views: args.views as usize };
+    let about = joined(
+        circumstances(&course.gpu),
+        json!({
+            "dataset": args.dataset.display().to_string(),
+            "train_views": dataset.train.len(),
+            "test_views": dataset.test.len(),
+            "budget": entries.first().map(|entry| entry.setup.about.budget),
+            "load_seconds": load_seconds,
+        }),
+    );
+    let mut runs = Vec::new();
+    for (number, entry) in entries.iter().enumerate() {
+        let seed = entry.setup.about.config.seed;
+        session.remarks.say(&format!(
+            "run {} of {}: {}, seed {seed}",
+            number + 1,
+            entries.len(),
+            entry.config
+        ));
+        let run = course.run(entry, session);
+        runs.push(run.with_context(|| format!("{}, seed {seed}", entry.config))?);
+        // After every run: a benchmark that is interrupted keeps what it has.
+        write(&args.out, &about, &runs)?;
+    }
+    session.print(&joined(about, json!({ "configs": summaries(&runs) })), &table(&runs, load_seconds))
+}
+
+/// Every config with every seed, all checked before any of them is run.
+fn entries(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<Entry>> {
+    let mut configs = Vec::new();
+    for path in &args.config {
+        let stem =
+            path.file_stem().map_or_else(|| path.display().to_string(), |s| s.to_string_lossy().into_owned());
+        ensure!(
+            configs.iter().all(|(name, _)| *name != stem),
+            "two configs are called '{stem}', and curves are named by their files; rename one of them"
+        );
+        configs.push((stem, Some(path.as_path())));
+    }
+    if configs.is_empty() {
+        configs.push(("default".to_owned(), None));
+    }
+    let mut seeds: Vec<Option<u32>> = match args.seeds {
+        Some(count) => (0..count).map(Some).collect(),
+        None => args.seed.iter().copied().map(Some).collect(),
+    };
+    if seeds.is_empty() {
+        seeds.push(None);
+    }
+    let path = args.dataset.display().to_string();
+    let budget = Budget { steps: args.steps, seconds: args.seconds };
+    let each = configs.iter().flat_map(|config| seeds.iter().map(move |&seed| (config, seed)));
+    let entry = |((name, config), seed): (&(String, Option<&Path>), Option<u32>)| {
+        let wishes =
+            Wishes { dataset: &path, config: *config, set: &args.set, seed, budget, ..Wishes::default() };
+        Ok(Entry { config: name.clone(), setup: Setup::new(&wishes, dataset, gpu, None)? })
+    };
+    each.map(entry).collect()
+}
+
+impl Course<'_> {
+    /// Trains and measures once.
+    fn run(&self, entry: &Entry, session: &Session<'_>) -> Result<Run> {
+        let setup = &entry.setup;
+        let clock = Instant::now();
+        let views = Views { cameras: &setup.cameras, images: &self.images, bounds: &setup.about.bounds };
+        let mut trainer = Trainer::new(&self.gpu, setup.plan.clone(), &views)?;
+        trainer.warm_up()?;
+        let mut exam = Exam::new(&self.gpu, setup, trainer.workspace(), self.dataset, self.views)?
+            .context("the dataset has no test views")?;
+        let compile_seconds = clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        let curve = follow(Pace::new(&setup.about, trainer, 0.0), &mut exam, session.remarks)?;
+        let settings = setup.about.config.clone();
+        Ok(Run {
+            config: entry.config.clone(),
+            seed: settings.seed,
+            compile_seconds,
+            evaluate_seconds: clock.elapsed().as_secs_f64() - curve.seconds,
+            curve,
+            settings,
+        })
+    }
+}
+
+fn write(folder: &Path, about: &Value, runs: &[Run]) -> Result<()> {
+    let whole = joined(about.clone(), json!({ "configs": summaries(runs), "runs": runs }));
+    write_json(&folder.join("training.json"), &whole)?;
+    let rows = runs.iter().flat_map(|run| run.curve.points.iter().map(move |point| (run, point)));
+    let rows = rows.map(|(run, point)| {
+        let measured = point.measured;
+        format!(
+            "{},{},{},{:.6},{},{},{},{}",
+            quoted(&run.config),
+            run.seed,
+            point.step,
+            point.seconds,
+            optional(point.loss),
+            optional(measured.map(|m| m.eval_psnr)),
+            optional(measured.map(|m| m.eval_ssim)),
+            optional(measured.map(|m| m.views)),
+        )
+    });
+    write_csv(&folder.join("training.csv"), "config,seed,step,seconds,loss,eval_psnr,eval_ssim,views", rows)?;
+    write_text(&folder.join("training.svg"), &picture::picture(runs)?)
+}
+
+/// The runs of one config.
+fn by_config(runs: &[Run]) -> impl Iterator<Item = &[Run]> {
+    runs.chunk_by(|a, b| a.config == b.config)
+}
+
+/// Mean and sample standard deviation; the latter with two values or more.
+fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, Option<f64>) {
+    let count = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    let squares: f64 = values.map(|value| (value - mean).powi(2)).sum();
+    (mean, (count > 1.0).then(|| (squares / (count - 1.0)).sqrt()))
+}
+
+fn summaries(runs: &[Run]) -> Vec<Value> {
+    let summary = |runs: &[Run]| {
+        let mean = |value: fn(&Run) -> f64| spread(runs.iter().map(value)).0;
+        let (psnr, psnr_spread) = spread(runs.iter().map(|run| run.curve.psnr));
+        json!({
+            "config": runs[0].config,
+            "seeds": runs.iter().map(|run| run.seed).collect::<Vec<_>>(),
+            "psnr": psnr,
+            "psnr_deviation": psnr_spread,
+            "ssim": mean(|run| run.curve.ssim),
+            "steps": mean(|run| f64::from(run.curve.steps)),
+            "seconds": mean(|run| run.curve.seconds),
+            "samples_per_second": mean(|run| run.curve.samples_per_second),
+            "compile_seconds": mean(|run| run.compile_seconds),
+            "evaluate_seconds": mean(|run| run.evaluate_seconds),
+        })
+    };
+    by_config(runs).map(summary).collect()
+}
+
+fn table(runs: &[Run], load_seconds: f64) -> String {
+    let header = [
+        "config",
+        "seeds",
+        "PSNR, dB",
+        "SSIM",
+        "seconds",
+        "steps",
+        "samples/s",
+        "compiling, s",
+        "measuring, s",
+    ];
+    let row = |runs: &[Run]| {
+        let mean = |value: fn(&Run) -> f64| spread(runs.iter().map(value)).0;
+        let (psnr, deviation) = spread(runs.iter().map(|run| run.curve.psnr));
+        vec![
+            runs[0].config.clone(),
+            runs.len().to_string(),
+            deviation.map_or_else(|| format!("{psnr:.2}"), |deviation| format!("{psnr:.2} ± {deviation:.2}")),
+            format!("{:.4}", mean(|run| run.curve.ssim)),
+            format!("{:.1}", mean(|run| run.curve.seconds)),
+            format!("{:.0}", mean(|run| f64::from(run.curve.steps))),
+            short(mean(|run| run.curve.samples_per_second)),
+            format!("{:.1}", mean(|run| run.compile_seconds)),
+            format!("{:.1}", mean(|run| run.evaluate_seconds)),
+        ]
+    };
+    let rows: Vec<_> = by_config(runs).map(row).collect();
+    format!("{}\n\nloading the dataset once took {load_seconds:.1} s", markdown(&header, &rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spreads_are_sample_deviations() {
+        assert_eq!(spread([2.0].into_iter()), (2.0, None));
+        assert_eq!(spread([1.0, 2.0, 3.0].into_iter()), (2.0, Some(1.0)));
+    }
+}
