@@ -10,12 +10,16 @@
 //! With `σ` taken as constant over a step, as compositing does (Max 1995; Mildenhall et al. 2020, eq. 3):
 //!
 //! - *Exclusive sum.* `Σ T_i α_i` telescopes to `1 − exp(−Σ τ_i)`: the opacity is as good as the midpoint rule for
-//!   `∫ σ dt`. On a smooth density that fades out at both ends it converges faster than any power of the step; at
-//!   a jump it is of order 1, since a wall lies up to half a step off. The colour is of order 2 on smooth densities
-//!   and of order 1 at jumps. An opaque wall is opaque with one sample.
-//! - *Inclusive sum.* Each weight is `e^{−τ_i}` too small, a relative error of `σ h`: order 1 for colour and opacity
-//!   on every density, and before `σ h < 1` there is no convergence at all: the wall is not seen.
-//! - *Early stop.* What lies behind transmittance `ε` is left out, an error of at most `ε` that no step reduces.
+//!   `∫ σ dt`. On a smooth density that fades out at both ends that converges faster than any power of the step, and
+//!   16 steps reach what f32 rounds; at a jump it is of order 1, since a wall lies up to half a step off, though with a
+//!   factor `T_end`. The colour is of order 2 on the bump (measured: 2.00) and of order 1 at jumps (0.99 to 1.01). An
+//!   opaque wall is opaque with one sample.
+//! - *Inclusive sum.* Each weight is `e^{−τ_i}` too small, a relative error of `σ h`: of order 1 for colour and opacity
+//!   on every density. The slopes measured where `σ h ≤ 1/2` are 0.90 to 0.96 and still rise to 1. Before that there is
+//!   no convergence at all: a wall is not seen until many steps lie within its first mean free path.
+//! - *Early stop.* What lies behind transmittance `ε` is left out, an error of at most `ε` that no step reduces. It
+//!   saves the more time, the more of the ray lies behind.
+//! - *Rounding.* The kernel's f32 sums differ from the f64 ones by 3·10⁻⁸ with 4 steps to 4·10⁻⁷ with 1024.
 
 pub mod order;
 

@@ -64,7 +64,7 @@ fn is_picture(path: &Path, words: &[&str]) {
 fn training_is_measured_over_time() {
     let here = folder("training");
     let (toys, out, wide) = (here.join("toys"), here.join("out"), here.join("wide.json"));
-    nerf(&["generate", "toys", "--views", "12", "--size", "16", "--samples", "1", "--out", text(&toys)])
+    nerf(&["generate", "toys", "--views", "24", "--size", "16", "--samples", "1", "--out", text(&toys)])
         .assert()
         .success();
     let smoke = here.join("smoke.json");
