@@ -23,6 +23,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+/// What the seconds of a training are.
+const CLOCK: &str = "training alone, without loading, compiling and measuring; the steps of one block in sixteen wait \
+                     for the device each, so that their stages can be timed";
+
 /// One training to be measured.
 struct Entry {
     /// The stem of its config's file.
@@ -76,6 +80,7 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
             "test_views": dataset.test.len(),
             "budget": entries.first().map(|entry| entry.setup.about.budget),
             "load_seconds": load_seconds,
+            "clock": CLOCK,
         }),
     );
     let mut runs = Vec::new();
