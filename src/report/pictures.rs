@@ -137,6 +137,8 @@ mod tests {
         let stripes: Vec<_> = (0..4 * LONGEST_SIDE).map(|x| [(x / 2 % 2) as f32; 3]).collect();
         let reduced = reduced(&stripes, [4 * LONGEST_SIDE, 1]).expect("pixels");
         assert_eq!(reduced.dimensions(), (LONGEST_SIDE, 1));
-        assert!(reduced.pixels().all(|pixel| (pixel[0] - 0.5).abs() < 0.01));
+        // At both ends the filter covers less.
+        let inner = (1..LONGEST_SIDE - 1).map(|x| reduced[(x, 0)][0]);
+        assert!(inner.into_iter().all(|value| (value - 0.5).abs() < 0.01));
     }
 }
