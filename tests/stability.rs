@@ -7,7 +7,7 @@ use nerf::dataset::Bounds;
 use nerf::gpu::{Gpu, adapter};
 use nerf::image::{Image, Pixels};
 use nerf::kernels::training::STATE;
-use nerf::kernels::{Needs, Plan};
+use nerf::kernels::{Counters, Needs, Plan};
 use nerf::model::Layout;
 use nerf::render::{Renderer, View};
 use nerf::train::{State, StepStats, Trainer, Views};
@@ -21,15 +21,15 @@ struct Scene {
     views: usize,
     /// World units per unit of the standard scene.
     scale: f64,
-    /// Where the cameras look, as a multiple of the direction to the origin.
-    toward: f64,
+    /// So many of the cameras look away from the origin.
+    away: usize,
     image: fn(u32, u32) -> Pixels,
     has_alpha: bool,
 }
 
 impl Default for Scene {
     fn default() -> Self {
-        Self { size: 12, views: 6, scale: 1.0, toward: 1.0, image: disc, has_alpha: true }
+        Self { size: 12, views: 6, scale: 1.0, away: 0, image: disc, has_alpha: true }
     }
 }
 
@@ -56,7 +56,7 @@ impl Scene {
         let camera = |number: usize| {
             let angle = number as f64 * 2.4;
             let eye = DVec3::new(angle.cos() * 3.0, angle.sin() * 3.0, 0.4 + 0.5 * (number % 3) as f64);
-            let back = eye.normalize() * self.toward;
+            let back = eye.normalize() * if number < self.away { -1.0 } else { 1.0 };
             let right = back.any_orthonormal_vector();
             let matrix = DMat3::from_cols(right, back.cross(right), back);
             Camera {
@@ -271,15 +271,26 @@ fn scenes_of_any_scale() {
     }
 }
 
-/// Cameras that look away see nothing of the box; a step without a sample is a step.
+/// Cameras that look away see nothing of the box: no sample lies outside of it, and a step without any is a step.
 #[test]
 fn rays_that_miss_the_box() {
     let mut config = config();
     config.batch.first_rays = 2048;
-    let mut training = Scene { toward: -1.0, ..Scene::default() }.train_with(config);
-    let stats = training.steps(20);
+    let image = |w, h| solid([200, 100, 50, 255], w, h);
+    let scene = |away| Scene { away, image, has_alpha: false, ..Scene::default() };
+    let mut all = scene(6).train_with(config.clone());
+    let stats = all.steps(20);
     assert!(stats.rays > 20_000 && stats.samples == 0, "{stats:?}");
-    training.survives(20);
+    all.survives(20);
+    let mut half = scene(3).train_with(config);
+    half.steps(20);
+    let workspace = half.trainer.workspace();
+    let counters: Counters = workspace.read(&half.gpu, "counters", 1).expect("counters")[0];
+    let samples: Vec<[f32; 4]> =
+        workspace.read(&half.gpu, "samples", counters.samples as usize).expect("samples");
+    let is_inside = |sample: &[f32; 4]| sample[..3].iter().all(|x| (-1e-4..1.0001).contains(x));
+    assert!(samples.len() > 1000 && samples.iter().all(is_inside));
+    half.survives(20);
 }
 
 /// The first rays ask for far more samples than there is room for: those that do not fit are left out.
