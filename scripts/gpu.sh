@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# One call on a GPU machine that has no toolchain: lists the adapters, runs the kernel tests, measures.
+# One call on a GPU machine that has no toolchain: lists the adapters, runs the kernel tests, checks and measures.
 # usage: OUT=FOLDER scripts/gpu.sh BINARIES [DATA]
 #   BINARIES  folder with nerf, step (benches/step) and, if the kernels shall be tested, kernels (tests/kernels)
 #   DATA      folder with datasets [default: the scene toys is generated]
@@ -32,5 +32,6 @@ else
     export ROWS=${ROWS:-toys:60}
     "$NERF" generate toys --out "$work/toys" --size 400
 fi
+"$(dirname "$0")/trust.sh" "$out/trust" || failed=yes
 "$(dirname "$0")/measure.sh" "$data" "$out"
-[ -z "$failed" ] || { echo "error: kernel tests failed; see kernels.txt" >&2 && exit 1; }
+[ -z "$failed" ] || { echo "error: kernels are wrong; see kernels.txt and trust/check.txt" >&2 && exit 1; }
