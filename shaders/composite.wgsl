@@ -1,6 +1,6 @@
 // The fused kernel: renders a ray, takes its loss, and walks back once for the gradients of colours and
 // log-densities. Section 2 of the design; the same formulas as `reference::composite`.
-// Needs: counters, exp, transmittance, weights.
+// Needs: counters, exp, sum, transmittance, weights.
 
 var<storage, read> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
@@ -13,7 +13,7 @@ var<storage, read> backgrounds: array<vec4<f32>>;
 var<storage, read_write> rendered: array<vec4<f32>>;
 // Squared errors of the four channels.
 var<storage, read_write> ray_errors: array<vec4<f32>>;
-// dL/dc in rgb and dL/ds in w. Between the walks it holds tau and T of each sample.
+// dL/dc in rgb and dL/ds in w. Between the walks it holds tau and the root of T of each sample.
 tensor<read_write> d_color: vec4<f32>;
 
 @compute @workgroup_size(64)
@@ -23,39 +23,48 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let span = kept_spans[index];
+    let end = span.x + span.y;
     let background = vec4(backgrounds[index].rgb, 0.0);
-    var depth = 0.0;
-    // What rounding took from `depth`: long rays would lose it.
-    var lost = 0.0;
-    var sum = vec4(0.0);
-    for (var i = span.x; i < span.x + span.y; i++) {
+    // There are fewer than 2^31 samples.
+    let zero = span.x >> 31u;
+    var depth = sum_of(vec4(0.0));
+    var sum = sum_of(vec4(0.0));
+    for (var i = span.x; i < end; i++) {
         let step = kept_steps_load(i);
         let tau = optical_depth(step.x, step.y);
-        let transmittance = transmittance_at(depth, tau);
-        let weight = transmittance * opacity(tau);
-        weight_store(i, weight);
-        sum += weight * vec4(color_load(i).rgb, 1.0);
-        d_color_store(i, vec4(tau, transmittance, 0.0, 0.0));
-        let term = tau - lost;
-        let next = depth + term;
-        lost = (next - depth) - term;
-        depth = next;
+        let root = exp_accurate(-0.5 * transmittance_depth(depth.value.x, tau));
+        let alpha = opacity(tau);
+        let own = vec4(color_load(i).rgb, 1.0);
+        weight_store(i, root * (root * alpha));
+        sum = sum_add(sum, squared_times(root, alpha * own), zero);
+        d_color_store(i, vec4(tau, root, 0.0, 0.0));
+        depth = sum_add(depth, vec4(tau), zero);
     }
-    let unblocked = exp_accurate(-depth);
-    let result = sum + unblocked * background;
+    let result = sum.value + squared_times(exp_accurate(-0.5 * depth.value.x), background);
     let error = result - targets[index];
     rendered[index] = result;
     ray_errors[index] = error * error;
 
     let d_result = error / (2.0 * f32(counters.rays_used));
-    var behind = background;
-    for (var i = span.x + span.y; i > span.x; i--) {
+    var behind = sum_of(background);
+    for (var i = end; i > span.x; i--) {
         let known = d_color_load(i - 1u);
-        let alpha = opacity(known.x);
-        let through = passing(known.x, alpha);
-        let own = vec4(color_load(i - 1u).rgb, 1.0);
-        let d_result_d_s = d_log_density(known.x, alpha, through, known.y, own, behind);
-        d_color_store(i - 1u, vec4(d_result.rgb * known.y * alpha, dot(d_result, d_result_d_s)));
-        behind = seen_through(alpha, through, own, behind);
+        let tau = known.x;
+        let alpha = opacity(tau);
+        let passing_root = exp_accurate(-0.5 * tau);
+        let color = vec4(color_load(i - 1u).rgb, 1.0);
+        let d_s = tau * dot(d_result, gradient_color(alpha, color, behind.value));
+        let d_c = squared_times(known.y, alpha * d_result).rgb;
+        let root = gradient_root(known.y, passing_root);
+        d_color_store(i - 1u, vec4(d_c, root * (root * d_s)));
+        let own = own_color(passing_root, color);
+        // Many thin samples would wear out B by the rounding of e^-tau. Both forms leave a B that equals the sample's
+        // colour as it is, so that nothing is learnt from rounding where all is one colour.
+        let difference = own - behind.value;
+        if tau < 0.35 {
+            behind = sum_add(behind, alpha * difference, zero);
+        } else {
+            behind = sum_of(own - squared_times(passing_root, difference));
+        }
     }
 }

@@ -9,6 +9,7 @@ macro_rules! part {
         ($path, include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $path)))
     };
 }
+pub(crate) use part;
 
 pub mod color;
 pub mod density;
@@ -36,7 +37,7 @@ use std::fmt::Display;
 /// A file of WGSL under its name.
 pub type Part = (&'static str, &'static str);
 
-const RANDOM: Part = part!("common/random.wgsl");
+pub(crate) const RANDOM: Part = part!("common/random.wgsl");
 const STEP: Part = part!("common/step.wgsl");
 const COUNTERS: Part = part!("common/counters.wgsl");
 const RAY: Part = part!("common/ray.wgsl");
@@ -45,8 +46,8 @@ const RAY_LOAD: Part = part!("common/ray_load.wgsl");
 const RAY_STORE: Part = part!("common/ray_store.wgsl");
 const OCCUPANCY: Part = part!("common/occupancy.wgsl");
 const MARCH_START: Part = part!("common/march_start.wgsl");
-const EXP: Part = part!("common/exp.wgsl");
-const DENSITY: Part = part!("common/density.wgsl");
+pub(crate) const EXP: Part = part!("common/exp.wgsl");
+pub(crate) const DENSITY: Part = part!("common/density.wgsl");
 const GRID: Part = part!("common/grid.wgsl");
 const HARMONICS: Part = part!("common/harmonics.wgsl");
 const USABLE: Part = part!("common/usable.wgsl");
@@ -269,7 +270,7 @@ impl Plan {
         }
     }
 
-    fn activation(&self) -> Part {
+    pub(crate) fn activation(&self) -> Part {
         if self.needs.hdr { part!("activation/exponential.wgsl") } else { part!("activation/sigmoid.wgsl") }
     }
 

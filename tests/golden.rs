@@ -5,7 +5,7 @@ use std::path::Path;
 use nerf::reference::Transmittance;
 use nerf::reference::composite::composite;
 use nerf::reference::textbook::{Precision, textbook_d_s};
-use nerf::reference::vectors::{GoldenFile, NOT_FINITE, RayError};
+use nerf::reference::vectors::{Expected, GoldenFile, NOT_FINITE, RayError};
 
 const CONVENTIONS: [Transmittance; 2] = [Transmittance::Exclusive, Transmittance::Inclusive];
 
@@ -100,4 +100,27 @@ fn textbook_gradient_cancels_in_single_precision() {
     }
     let overflow = textbook_error(&file, "density overflow behind thin samples", Precision::Single);
     assert_eq!(overflow, f64::INFINITY);
+}
+
+/// Expectations from f64, and their scales, are those of 60-digit arithmetic.
+#[test]
+fn expectations_are_those_of_the_files() {
+    for convention in CONVENTIONS {
+        let file = golden(convention);
+        for ray in &file.rays {
+            let got = Expected::of(convention, &file.input(ray));
+            let want = &ray.expect;
+            let close = |name: &str, got: &[f64], want: &[f64]| {
+                assert_eq!(got.len(), want.len());
+                for (got, want) in got.iter().zip(want) {
+                    let bound = 1e-9 * want.abs() + 1e-35;
+                    assert!((got - want).abs() <= bound, "{} {name}: {got:e}, {want:e}", ray.name);
+                }
+            };
+            close("R", &got.rendered_scale, &want.rendered_scale);
+            close("loss", &[got.loss_scale], &[want.loss_scale]);
+            close("dL_dc", got.d_color_scale.as_flattened(), want.d_color_scale.as_flattened());
+            close("dL_ds", &got.d_s_scale, &want.d_s_scale);
+        }
+    }
 }

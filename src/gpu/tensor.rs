@@ -21,6 +21,10 @@ pub enum Memory {
     Textures,
 }
 
+/// What an adapter must have for tensors in textures.
+pub const TEXTURE_FEATURES: wgpu::Features =
+    wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES.union(wgpu::Features::CLEAR_TEXTURE);
+
 /// Texels per row.
 pub const WIDTH: usize = 1024;
 
@@ -162,9 +166,7 @@ impl Gpu {
     /// The memory that suits this adapter.
     #[must_use]
     pub fn fast_memory(&self) -> Memory {
-        let features =
-            wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES | wgpu::Features::CLEAR_TEXTURE;
-        if self.is_cpu() && self.has(features) { Memory::Textures } else { Memory::Buffers }
+        if self.is_cpu() && self.has(TEXTURE_FEATURES) { Memory::Textures } else { Memory::Buffers }
     }
 
     /// A zeroed tensor.

@@ -96,7 +96,8 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -> Result<Stage> {
     let weights = if weights { part!("weights/stored.wgsl") } else { part!("weights/none.wgsl") };
-    let parts = [COUNTERS, EXP, plan.transmittance(), weights, part!("composite.wgsl")];
+    let sum = part!("common/sum.wgsl");
+    let parts = [COUNTERS, EXP, sum, plan.transmittance(), weights, part!("composite.wgsl")];
     let kernel = plan.kernel(gpu, "composite", &parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }

@@ -77,15 +77,13 @@ pub fn opacity(depth: f64) -> f64 {
 
 /// Composites a ray, and gives its loss and gradients. See the module for the formulas.
 pub fn composite(convention: Transmittance, ray: &CompositeInput) -> CompositeOutput {
-    let depths: Vec<f64> =
-        (ray.s.iter().zip(ray.delta)).map(|(&s, &delta)| optical_depth(s, delta)).collect();
+    let depths = optical_depths(ray);
     let transmittances = transmittances(convention, &depths);
     let transmittance_end = (-depths.iter().sum::<f64>()).exp();
     let weights: Vec<f64> =
         (transmittances.iter().zip(&depths)).map(|(t, &depth)| t * opacity(depth)).collect();
 
-    let background = with_opacity(ray.background, 0.0);
-    let mut rendered = background.map(|b| transmittance_end * b);
+    let mut rendered = with_opacity(ray.background, 0.0).map(|b| transmittance_end * b);
     for (&w, &color) in weights.iter().zip(ray.color) {
         let color = with_opacity(color, 1.0);
         for x in 0..4 {
@@ -97,37 +95,44 @@ pub fn composite(convention: Transmittance, ray: &CompositeInput) -> CompositeOu
     let residual: [f64; 4] = std::array::from_fn(|x| rendered[x] - ray.target[x]);
     let loss_terms = residual.map(|r| r * r);
     let d_rendered = residual.map(|r| r / (2.0 * m));
+    let by_s = d_rendered_by_s(convention, ray);
+    CompositeOutput {
+        rendered,
+        loss_terms,
+        loss: loss_terms.iter().sum::<f64>() / (4.0 * m),
+        d_color: (weights.iter()).map(|w| std::array::from_fn(|x| d_rendered[x] * w)).collect(),
+        d_s: (by_s.iter()).map(|by_s| (0..4).map(|x| d_rendered[x] * by_s[x]).sum()).collect(),
+        weights,
+        transmittance_end,
+    }
+}
 
-    let d_color = (weights.iter()).map(|w| std::array::from_fn(|x| d_rendered[x] * w)).collect();
-
-    let mut d_s = vec![0.0; depths.len()];
-    let mut behind = background;
+/// dR/ds of every sample, `[samples, 4]`, by one walk from back to front.
+pub fn d_rendered_by_s(convention: Transmittance, ray: &CompositeInput) -> Vec<[f64; 4]> {
+    let depths = optical_depths(ray);
+    let transmittances = transmittances(convention, &depths);
+    let mut behind = with_opacity(ray.background, 0.0);
+    let mut derivatives = vec![[0.0; 4]; depths.len()];
     for i in (0..depths.len()).rev() {
         let (depth, t) = (depths[i], transmittances[i]);
         let (alpha, through) = (opacity(depth), (-depth).exp());
         let color = with_opacity(ray.color[i], 1.0);
         for x in 0..4 {
             let (c, b) = (color[x], behind[x]);
-            let (d_rendered_by_s, in_front) = match convention {
+            (derivatives[i][x], behind[x]) = match convention {
                 Transmittance::Exclusive => (depth * through * t * (c - b), alpha * c + through * b),
                 Transmittance::Inclusive => {
                     (depth * t * ((1.0 - 2.0 * alpha) * c - b), through * (alpha * c + b))
                 }
             };
-            d_s[i] += d_rendered[x] * d_rendered_by_s;
-            behind[x] = in_front;
         }
     }
+    derivatives
+}
 
-    CompositeOutput {
-        rendered,
-        loss_terms,
-        loss: loss_terms.iter().sum::<f64>() / (4.0 * m),
-        weights,
-        transmittance_end,
-        d_color,
-        d_s,
-    }
+/// `τ_i` of every sample.
+pub fn optical_depths(ray: &CompositeInput) -> Vec<f64> {
+    (ray.s.iter().zip(ray.delta)).map(|(&s, &delta)| optical_depth(s, delta)).collect()
 }
 
 /// `T_i` of every sample, from the optical depths.
@@ -157,7 +162,8 @@ pub fn mean_depth(weights: &[f64], z: &[f64]) -> f64 {
     weights.iter().zip(z).map(|(w, z)| w * z).sum::<f64>() / opacity
 }
 
-fn with_opacity(color: [f64; 3], opacity: f64) -> [f64; 4] {
+/// The four channels of a colour: its own and `opacity`.
+pub(super) fn with_opacity(color: [f64; 3], opacity: f64) -> [f64; 4] {
     [color[0], color[1], color[2], opacity]
 }
 

@@ -5,11 +5,14 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
-use serde::Deserialize;
+use anyhow::{Context, Result, anyhow, ensure};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::Transmittance;
-use super::composite::{CompositeInput, CompositeOutput};
+use super::composite::{
+    CompositeInput, CompositeOutput, composite, d_rendered_by_s, optical_depths, transmittances, with_opacity,
+};
 
 /// Smallest scale of an error.
 pub const MIN_SCALE: f64 = 1e-30;
@@ -17,7 +20,7 @@ pub const MIN_SCALE: f64 = 1e-30;
 pub const NOT_FINITE: f64 = 1e30;
 
 /// A file of golden rays. Fields that are not named here are ignored.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GoldenFile {
     /// Convention that the expected values follow.
     pub transmittance: Transmittance,
@@ -30,7 +33,7 @@ pub struct GoldenFile {
 }
 
 /// One golden ray.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GoldenRay {
     /// What is special about it.
     pub name: String,
@@ -51,7 +54,7 @@ pub struct GoldenRay {
 }
 
 /// The expected values of a ray, and the scales of their errors.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Expected {
     /// Composited colour and opacity.
     #[serde(rename = "R")]
@@ -101,14 +104,17 @@ impl GoldenFile {
         Self::parse(&text).with_context(|| format!("{} is not a file of golden rays", path.display()))
     }
 
-    /// Reads golden rays from JSON text and checks that the lengths in it agree.
+    /// Reads golden rays from JSON text and checks that every input is a number of single precision and that the
+    /// lengths in it agree; an error names the ray and the field.
     pub fn parse(text: &str) -> Result<Self> {
-        let file: Self = serde_json::from_str(text)?;
-        ensure!(file.rays_in_batch > 0, "rays_in_batch is 0, expected at least 1");
-        for (i, ray) in file.rays.iter().enumerate() {
-            ray.check_lengths().with_context(|| format!("ray {i} \"{}\"", ray.name))?;
-        }
-        Ok(file)
+        let Unread { transmittance, rays_in_batch, loss, rays } =
+            read(&mut serde_json::Deserializer::from_str(text))?;
+        ensure!(rays_in_batch > 0, "rays_in_batch is 0, expected at least 1");
+        let rays = rays.into_iter().enumerate().map(|(i, ray)| {
+            let name = ray.get("name").and_then(Value::as_str).unwrap_or("without a name").to_owned();
+            GoldenRay::parse(ray).with_context(|| format!("ray {i} \"{name}\""))
+        });
+        Ok(Self { transmittance, rays_in_batch, loss, rays: rays.collect::<Result<_>>()? })
     }
 
     /// A ray of this file as compositing takes it.
@@ -125,7 +131,41 @@ impl GoldenFile {
     }
 }
 
+/// A file whose rays are not looked at yet.
+#[derive(Deserialize)]
+struct Unread {
+    transmittance: Transmittance,
+    rays_in_batch: u32,
+    loss: Option<f64>,
+    rays: Vec<Value>,
+}
+
+/// Reads a value; an error names the field that is wrong.
+fn read<'de, T: Deserialize<'de>>(from: impl serde::Deserializer<'de>) -> Result<T> {
+    serde_path_to_error::deserialize(from).map_err(|error| match error.path().iter().next() {
+        Some(_) => anyhow!("{}: {}", error.path(), error.inner()),
+        None => anyhow!("{}", error.inner()),
+    })
+}
+
 impl GoldenRay {
+    fn parse(ray: Value) -> Result<Self> {
+        let ray: Self = read(ray)?;
+        ray.check_lengths()?;
+        let color = ray.c.as_flattened();
+        for (name, values) in [
+            ("s", &ray.s[..]),
+            ("delta", &ray.delta),
+            ("c", color),
+            ("gt", &ray.gt),
+            ("background", &ray.background),
+        ] {
+            let beyond = values.iter().find(|value| !(value.abs() <= f64::from(f32::MAX)));
+            ensure!(beyond.is_none(), "{name} holds {beyond:?}, expected numbers of single precision");
+        }
+        Ok(ray)
+    }
+
     fn check_lengths(&self) -> Result<()> {
         let (samples, expect) = (self.s.len(), &self.expect);
         for (name, length) in [
@@ -141,6 +181,64 @@ impl GoldenRay {
         }
         Ok(())
     }
+}
+
+impl Expected {
+    /// What the reference makes of a ray, and the scales of the fields above.
+    pub fn of(convention: Transmittance, ray: &CompositeInput) -> Self {
+        let output = composite(convention, ray);
+        let m = f64::from(ray.rays_in_batch.max(1));
+        let both: [f64; 4] = std::array::from_fn(|x| output.rendered[x].abs() + ray.target[x].abs());
+        let unblocked = with_opacity(ray.background, 0.0).map(|b| output.transmittance_end * b.abs());
+        let mut rendered_scale = unblocked;
+        for (w, &color) in output.weights.iter().zip(ray.color) {
+            let color = with_opacity(color, 1.0);
+            (0..4).for_each(|x| rendered_scale[x] += w * color[x].abs());
+        }
+        let by_s = d_rendered_by_s(convention, ray);
+        let terms = terms_of_d_s(convention, ray, &output.weights, unblocked);
+        let d_s_scale = (by_s.iter().zip(&terms)).map(|(by_s, terms)| {
+            let of_channel = |x: usize| output.loss_terms[x].sqrt() * terms[x] + both[x] * by_s[x].abs();
+            (0..4).map(of_channel).sum::<f64>() / (2.0 * m)
+        });
+        let d_color_scale = output.weights.iter().map(|w| std::array::from_fn(|x| both[x] / (2.0 * m) * w));
+        Self {
+            rendered_scale,
+            loss_scale: both.iter().map(|x| x * x).sum::<f64>() / (4.0 * m),
+            d_color_scale: d_color_scale.collect(),
+            d_s_scale: d_s_scale.collect(),
+            rendered: output.rendered,
+            loss_terms: output.loss_terms,
+            loss: output.loss,
+            weights: output.weights,
+            d_color: output.d_color,
+            d_s: output.d_s,
+        }
+    }
+}
+
+/// `τ_i (|own| + |behind| + |T_{N+1} b_x|)` of every sample and channel, what dR/ds_i is summed from.
+fn terms_of_d_s(
+    convention: Transmittance,
+    ray: &CompositeInput,
+    weights: &[f64],
+    unblocked: [f64; 4],
+) -> Vec<[f64; 4]> {
+    let depths = optical_depths(ray);
+    let transmittances = transmittances(convention, &depths);
+    let mut behind = [0.0; 4];
+    let mut terms = vec![[0.0; 4]; depths.len()];
+    for i in (0..depths.len()).rev() {
+        let color = with_opacity(ray.color[i], 1.0);
+        let passing = transmittances[i] * (-depths[i]).exp();
+        for x in 0..4 {
+            let later: f64 = behind[x];
+            behind[x] += weights[i] * color[x];
+            let behind = if convention == Transmittance::Exclusive { later } else { behind[x] };
+            terms[i][x] = depths[i] * ((passing * color[x]).abs() + behind.abs() + unblocked[x]);
+        }
+    }
+    terms
 }
 
 impl RayError {

@@ -4,8 +4,8 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use nerf::check::Workbench;
 pub(crate) use nerf::check::draw::{Random, SEED, STEP, dimension, quiet_step, random_batch, uniform};
+use nerf::check::{Forced, Subject, Tally, Workbench};
 pub(crate) use nerf::check::{Kept, Outcome, Setup, visible_cells};
 use nerf::gpu::pass::Stage;
 use nerf::gpu::{Gpu, adapter};
@@ -103,5 +103,20 @@ impl Bench {
 
     pub(crate) fn train(&self, stages: &[Stage], rays: &[TrainingRay]) -> Outcome {
         self.0.train(stages, rays).expect("a device that answers")
+    }
+}
+
+/// The adapter under test, with what its plan chooses.
+pub(crate) fn subject() -> Subject {
+    Subject::new(&Arc::new(open()), Forced::default()).expect("nothing is forced")
+}
+
+/// Prints what was found, and fails where a bound is broken.
+#[track_caller]
+pub(crate) fn passes(tallies: impl IntoIterator<Item = Tally>) {
+    for tally in tallies {
+        let Tally { name, cases, worst, bound, case, .. } = &tally;
+        println!("{name}: {worst:.2e} of {bound:.1e} over {cases} cases; {case}");
+        assert!(tally.pass, "{name}: {worst:e} is beyond {bound:e}: {case}");
     }
 }

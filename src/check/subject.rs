@@ -1,0 +1,100 @@
+//! What is checked: an adapter, and the variants its kernels are linked from.
+
+use super::{Setup, Workbench};
+use crate::config::Accumulation;
+use crate::gpu::Gpu;
+use crate::gpu::tensor::Memory;
+use crate::kernels::layer::Product;
+use crate::kernels::{Plan, training::accumulation_name};
+use anyhow::{Result, ensure};
+use std::sync::Arc;
+
+/// Variants to check instead of those that the plan chooses for the adapter; `None` leaves them to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Forced {
+    /// How the table's gradients are summed.
+    pub accumulation: Option<Accumulation>,
+    /// Where tensors live.
+    pub memory: Option<Memory>,
+    /// How matrix products are written.
+    pub product: Option<Product>,
+}
+
+/// An adapter under check.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The adapter.
+    pub gpu: Arc<Gpu>,
+    forced: Forced,
+}
+
+impl Subject {
+    /// The adapter with these variants.
+    ///
+    /// # Errors
+    /// When it cannot run one of them; the message says what it lacks.
+    pub fn new(gpu: &Arc<Gpu>, forced: Forced) -> Result<Self> {
+        let name = &gpu.info.name;
+        ensure!(
+            forced.accumulation != Some(Accumulation::Float)
+                || gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC),
+            "float accumulation needs atomic addition of floats, and the adapter '{name}' does not have it; leave it \
+             out, or ask for exchange or fixed"
+        );
+        ensure!(
+            forced.memory != Some(Memory::Textures) || gpu.has(crate::gpu::tensor::TEXTURE_FEATURES),
+            "tensors in textures need textures that a kernel reads and writes, and the adapter '{name}' does not \
+             have them; leave it out, or ask for buffers"
+        );
+        ensure!(
+            forced.product.is_none_or(|product| !product.shared_weights) || gpu.has_subgroups_of(8),
+            "shared weights need subgroups of a multiple of 8 threads, and those of the adapter '{name}' have {}; \
+             leave it out, or ask for 1, 2 or 4 rows",
+            gpu.info.subgroup_min_size
+        );
+        Ok(Self { gpu: Arc::clone(gpu), forced })
+    }
+
+    /// `setup` with the forced variants.
+    #[must_use]
+    pub fn setup(&self, mut setup: Setup) -> Setup {
+        setup.config.accumulation = self.forced.accumulation.unwrap_or(setup.config.accumulation);
+        setup.memory = self.forced.memory.or(setup.memory);
+        setup.product = self.forced.product.or(setup.product);
+        setup
+    }
+
+    /// A workbench of `setup` with the forced variants.
+    ///
+    /// # Errors
+    /// As [`Workbench::new`].
+    pub fn workbench(&self, setup: Setup) -> Result<Workbench> {
+        Workbench::new(&self.gpu, &self.setup(setup))
+    }
+
+    /// Which variants are checked, and why these.
+    ///
+    /// # Errors
+    /// Never: the plan is a valid one.
+    pub fn describe(&self) -> Result<String> {
+        let Plan { accumulation, memory, product, .. } = self.setup(Setup::tiny()).plan(&self.gpu)?;
+        let kind = if self.gpu.is_cpu() { "a CPU adapter" } else { "a GPU" };
+        let why =
+            |is_forced: bool| if is_forced { "asked for".into() } else { format!("the choice for {kind}") };
+        let memory = match memory {
+            Memory::Buffers => "tensors in buffers",
+            Memory::Textures => "tensors in textures",
+        };
+        let rows = if product.rows == 1 { "row" } else { "rows" };
+        let weights = if product.shared_weights { " and shared weights" } else { "" };
+        let Forced { accumulation: forced_sum, memory: forced_memory, product: forced_product } = self.forced;
+        Ok(format!(
+            "{} ({}), {memory} ({}), matrix products of {} {rows} per thread{weights} ({})",
+            accumulation_name(accumulation),
+            why(forced_sum.is_some_and(|sum| sum != Accumulation::Auto)),
+            why(forced_memory.is_some()),
+            product.rows,
+            why(forced_product.is_some()),
+        ))
+    }
+}
