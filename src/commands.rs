@@ -2,6 +2,7 @@
 
 mod adapters;
 mod bench;
+mod check;
 mod eval;
 mod exam;
 mod field;
@@ -32,9 +33,22 @@ pub(crate) fn run(cli: &Cli) -> Result<()> {
         Command::Report(args) => report::run(args, &session),
         Command::Generate(args) => generate::run(args, &session),
         Command::Bench(what) => bench::run(what, &session),
+        Command::Check(args) => check::run(args, &session),
         Command::Adapters => adapters::run(&session),
     }
 }
+
+/// A failure whose result, with all there is to say about it, was printed already.
+#[derive(Debug)]
+pub(crate) struct Failed(String);
+
+impl std::fmt::Display for Failed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Failed {}
 
 /// What every subcommand is given.
 #[derive(Clone, Copy, Debug)]

@@ -17,7 +17,7 @@ fn main() -> ExitCode {
     }
     let message = format!("{error:#}");
     // Where even this cannot be written, the exit code still tells.
-    if cli.global.json {
+    if cli.global.json && !error.is::<commands::Failed>() {
         let _ = writeln!(std::io::stdout(), "{}", serde_json::json!({ "error": message }));
     }
     let _ = writeln!(std::io::stderr(), "error: {message}");

@@ -81,7 +81,7 @@ impl Tally {
 }
 
 /// The largest magnitude, at least 1e-30: what the error of a gradient is relative to.
-pub fn largest<T: Copy + Into<f64>>(values: &[T]) -> f64 {
+pub(super) fn largest<T: Copy + Into<f64>>(values: &[T]) -> f64 {
     values.iter().fold(1e-30, |most, &value| most.max(value.into().abs()))
 }
 

@@ -23,6 +23,8 @@ pub struct Workbench {
     pub plan: Plan,
     /// The buffers.
     pub workspace: Workspace,
+    /// The scan over marched samples.
+    scan: Arc<Stage>,
 }
 
 /// A kept sample.
@@ -63,9 +65,18 @@ impl Workbench {
     pub fn new(gpu: &Arc<Gpu>, setup: &Setup) -> Result<Self> {
         let plan = setup.plan(gpu)?;
         let workspace = allocate(gpu, &plan)?;
-        let bench = Self { gpu: Arc::clone(gpu), plan, workspace };
+        let bench = Self::of(gpu, plan, workspace)?;
         bench.set_step(quiet_step());
         Ok(bench)
+    }
+
+    /// The buffers of something else, for example of a trainer.
+    ///
+    /// # Errors
+    /// When the adapter refuses a kernel.
+    pub fn of(gpu: &Arc<Gpu>, plan: Plan, workspace: Workspace) -> Result<Self> {
+        let scan = Arc::new(marching::scan(gpu, &plan, &workspace, marching::Scanned::Samples)?);
+        Ok(Self { gpu: Arc::clone(gpu), plan, workspace, scan })
     }
 
     /// Writes `data` at the start of a buffer or tensor, before the next submission.
@@ -185,7 +196,7 @@ impl Workbench {
         self.write("backgrounds", &backgrounds);
         // The scan turns counts into spans and sets all dispatch sizes.
         self.set_rays(rays.len());
-        self.run([&marching::scan(&self.gpu, &self.plan, &self.workspace, marching::Scanned::Samples)?])
+        self.run([&*self.scan])
     }
 
     /// Raw log-densities of the samples, as if the network had run.

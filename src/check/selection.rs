@@ -1,0 +1,182 @@
+//! Which samples get colour: select, scan and pack.
+
+use super::draw::{Random, dimension, random_batch, uniform};
+use super::{Kept, Setup, Subject, Tally, Workbench};
+use crate::gpu::pass::Stage;
+use crate::kernels::color;
+use crate::reference::activation::{MAX_LOG_DENSITY, log_density};
+use crate::reference::model::TrainingRay;
+use crate::reference::selection::{self, select};
+use anyhow::Result;
+
+/// The stages of [`color::stages`] up to the packed samples.
+const STAGES: usize = 3;
+
+/// The selection of a plan on a workbench.
+#[derive(Debug)]
+pub struct Selecting {
+    /// The buffers.
+    pub bench: Workbench,
+    stages: Vec<Stage>,
+}
+
+/// Chosen samples and the steps they stand for: of ordinary rays, of a fog in which most end, by weight alone, and
+/// all.
+///
+/// # Errors
+/// When the device was lost or refuses a kernel.
+pub fn selected_samples(subject: &Subject) -> Result<Tally> {
+    let mut tally =
+        Tally::new("selection", 1e-5, "a weight over the floor, and its sum along the ray, round");
+    let mut random = Random::new(30);
+    let ordinary = Selecting::new(subject, setup())?;
+    for (rays, samples) in [(3, 0), (1, 1), (2, 3), (9, 65), (33, 130), (200, 250)] {
+        let rays = random_batch(&mut random, rays, samples);
+        let raw = raw_densities(&mut random, samples);
+        ordinary.compare(&mut tally, &rays, &raw)?;
+    }
+    let mut dense = setup();
+    dense.config.selection.keep_probability = 1.0;
+    let dense = Selecting::new(subject, dense)?;
+    let rays = random_batch(&mut random, 60, 380);
+    let kept = dense.compare(&mut tally, &rays, &random.numbers(380, 2.0, 3.0))?;
+    tally.holds(kept < 380, || "no ray ends in a fog".into());
+    for probability in [0.0, 1.0] {
+        let mut setup = setup();
+        setup.config.selection.keep_probability = probability;
+        setup.config.selection.weight_floor = 1.0;
+        setup.config.selection.stop_transmittance = 0.0;
+        let selecting = Selecting::new(subject, setup)?;
+        let rays = random_batch(&mut random, 33, 130);
+        let raw: Vec<f32> = raw_densities(&mut random, 130).into_iter().map(|raw| raw.min(0.0)).collect();
+        let kept = selecting.compare(&mut tally, &rays, &raw)?;
+        tally.holds((kept == 130) == (probability == 1.0), || format!("{kept} kept at {probability}"));
+    }
+    Ok(tally)
+}
+
+/// A selection like the default one, of numbers that f32 holds.
+fn setup() -> Setup {
+    let mut setup = Setup::tiny();
+    setup.config.selection.weight_floor = f64::from(1e-3_f32);
+    setup.config.selection.keep_probability = f64::from(0.2_f32);
+    setup.config.selection.stop_transmittance = f64::from(1e-4_f32);
+    setup
+}
+
+/// Light, heavy and clamped samples.
+fn raw_densities(random: &mut Random, samples: usize) -> Vec<f32> {
+    let raw = (0..samples).map(|i| match i % 5 {
+        0 => random.number(-12.0, -5.0) as f32,
+        4 if i % 20 == 19 => 40.0,
+        _ => random.number(-3.0, 5.0) as f32,
+    });
+    raw.collect()
+}
+
+impl Selecting {
+    /// A workbench with the kernels of the selection.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold it or refuses a kernel.
+    pub fn new(subject: &Subject, setup: Setup) -> Result<Self> {
+        let bench = subject.workbench(setup)?;
+        let mut stages =
+            color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::Selection::Training)?;
+        stages.truncate(STAGES);
+        Ok(Self { bench, stages })
+    }
+
+    /// Selects among the samples of `rays` with raw log-densities `raw`.
+    ///
+    /// # Errors
+    /// When there is no room for them, or the device was lost.
+    pub fn run(&self, rays: &[TrainingRay], raw: &[f32]) -> Result<()> {
+        self.bench.upload(rays)?;
+        self.bench.set_raw_density(raw);
+        self.bench.run(&self.stages)
+    }
+
+    /// Compares with the reference; returns how many samples were kept.
+    fn compare(&self, tally: &mut Tally, rays: &[TrainingRay], raw: &[f32]) -> Result<usize> {
+        self.run(rays, raw)?;
+        let counters = self.bench.counters()?;
+        let kept = counters.kept as usize;
+        let all_used = counters.rays_used as usize == rays.len() && counters.kept_wanted == counters.kept;
+        tally.holds(all_used, || format!("{counters:?}"));
+        let spans: Vec<[u32; 2]> = self.bench.read("kept_spans", rays.len())?;
+        let all = self.bench.kept(kept)?;
+        let (mut first, mut packed, mut close) = (0, 0, 0);
+        for (number, (ray, span)) in rays.iter().zip(&spans).enumerate() {
+            let [begin, count] = span.map(|x| x as usize);
+            let is_packed = begin == packed && begin + count <= kept;
+            tally.holds(is_packed, || format!("ray {number} is not behind the one before"));
+            if !is_packed {
+                return Ok(kept);
+            }
+            packed += count;
+            let raw = &raw[first..first + ray.samples.len()];
+            close += usize::from(!self.compare_ray(tally, number, ray, raw, &all[begin..packed], first));
+            first += ray.samples.len();
+        }
+        tally.holds(packed == kept, || format!("{packed} of {kept} belong to rays"));
+        tally.holds(close * 10 <= rays.len(), || format!("{close} of {} too close to call", rays.len()));
+        Ok(kept)
+    }
+
+    /// Compares the chosen samples of a ray whose first sample is `first`; false where rounding may decide.
+    fn compare_ray(
+        &self,
+        tally: &mut Tally,
+        number: usize,
+        ray: &TrainingRay,
+        raw: &[f32],
+        chosen: &[Kept],
+        first: usize,
+    ) -> bool {
+        let case = || format!("ray {number} of {} samples", ray.samples.len());
+        for kept in chosen {
+            let s =
+                raw.get((kept.sample as usize).wrapping_sub(first)).map(|s| s.min(MAX_LOG_DENSITY as f32));
+            tally.holds(kept.ray as usize == number && s == Some(kept.s), || format!("{}: {kept:?}", case()));
+        }
+        let Some(want) = self.reference(number, ray, raw) else { return false };
+        let samples = chosen.iter().map(|kept| kept.sample as usize);
+        let same = samples.eq(want.iter().map(|kept| first + kept.index));
+        tally.holds(same, || format!("{}: other samples than {want:?}", case()));
+        if same {
+            for (got, want) in chosen.iter().zip(&want) {
+                let delta = want.gain * ray.samples[want.index].delta;
+                tally.value(got.delta.into(), delta, delta, || format!("{}: step", case()));
+            }
+        }
+        true
+    }
+
+    /// What the reference keeps of ray `number`; `None` where rounding may decide.
+    fn reference(&self, number: usize, ray: &TrainingRay, raw: &[f32]) -> Option<Vec<selection::Kept>> {
+        let config = &self.bench.plan.config.selection;
+        let selection = selection::Selection {
+            stop_transmittance: config.stop_transmittance,
+            floor: config.weight_floor,
+            probability: config.keep_probability,
+        };
+        let s: Vec<f64> = raw.iter().map(|&raw| log_density(f64::from(raw))).collect();
+        let delta: Vec<f64> = ray.samples.iter().map(|sample| sample.delta).collect();
+        let u = uniform(number, dimension::SELECTION);
+        let want = select(&selection, &s, &delta, u);
+        // A little more or less luck, or light, must not change the choice.
+        let indices = |kept: &[selection::Kept]| kept.iter().map(|kept| kept.index).collect::<Vec<_>>();
+        for nudge in [-1e-4, 1e-4] {
+            let stop_transmittance = selection.stop_transmittance * (1.0 + nudge);
+            let floor = selection.floor * (1.0 + nudge);
+            let other = selection::Selection { stop_transmittance, floor, ..selection };
+            for u in [u - 1e-5, u + 1e-5] {
+                if indices(&select(&other, &s, &delta, u)) != indices(&want) {
+                    return None;
+                }
+            }
+        }
+        Some(want)
+    }
+}

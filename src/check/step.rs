@@ -1,0 +1,239 @@
+//! Whole training steps of a tiny field, through the trainer, on the samples that the device chose.
+
+use super::draw::Random;
+use super::tally::largest;
+use super::{Setup, Subject, Tally, Workbench};
+use crate::camera::{Camera, Lens};
+use crate::config::{Background, Optimizer, Selection};
+use crate::dataset::Bounds;
+use crate::image::{Image, Pixels};
+use crate::reference::Transmittance;
+use crate::reference::adam::Adam;
+use crate::reference::model::{BatchOutput, Model, RaySample, TrainingRay};
+use crate::reference::step::Training;
+use crate::train::{Trainer, Views};
+use anyhow::Result;
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+
+/// Learning rate of every step.
+pub const LEARNING_RATE: f64 = 1e-2;
+
+/// A trainer of a tiny field, and its buffers as a workbench.
+#[derive(Debug)]
+pub struct TinyTraining {
+    /// The trainer.
+    pub trainer: Trainer,
+    /// Its buffers.
+    pub bench: Workbench,
+}
+
+/// What is trained, by name: plain, over random backgrounds, in the inclusive convention, and with linear light and
+/// cascades.
+#[must_use]
+pub fn setups() -> [(&'static str, Setup); 4] {
+    let mut random_background = Setup::tiny().network(32, 2);
+    random_background.config.background = Background::Random;
+    let mut cascades = Setup::tiny().network(32, 1).hdr(true);
+    cascades.needs.cascades = 3;
+    [
+        ("plain", Setup::tiny()),
+        ("random background", random_background),
+        ("inclusive", Setup::tiny().transmittance(Transmittance::Inclusive)),
+        ("hdr, 3 cascades", cascades),
+    ]
+}
+
+/// Loss, gradients and parameters of one step of each of `setups`.
+///
+/// # Errors
+/// When the device was lost or refuses a kernel.
+pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
+    let mut tally =
+        Tally::new("one whole step", 5e-5, "gradients of all kernels, relative to the largest of their kind");
+    for (name, setup) in setups {
+        let mut tiny = TinyTraining::new(subject, setup.clone())?;
+        // Larger features than the initial ones, so that every gradient matters.
+        tiny.bench.randomise(&mut Random::new(81), 0.5, 1.0)?;
+        let mut reference = tiny.reference()?;
+        let before = reference.model.clone();
+        let (loss, batch) = tiny.step()?;
+        let filled = batch.len() >= 16 && batch.iter().any(|ray| ray.samples.len() > 3);
+        tally.holds(filled && tiny.lengthened()? > 3, || format!("{name}: a thin batch"));
+        let want = reference.step(&batch, LEARNING_RATE);
+        tally.value(loss, want.loss, want.loss, || format!("{name}: loss"));
+        compare_moments(&mut tally, name, &tiny.bench, &reference)?;
+        compare_parameters(&mut tally, name, [&before, &tiny.bench.model()?], &reference, &want);
+    }
+    Ok(tally)
+}
+
+/// β1 = 0.9: the first moment is a tenth of the gradient.
+fn compare_moments(tally: &mut Tally, name: &str, bench: &Workbench, reference: &Training) -> Result<()> {
+    let [first, _] = bench.table_moments()?;
+    tally.all(&format!("{name}: gradient of the table"), &first, &reference.table_moments.first);
+    let moments = reference.density_moments.iter().chain(&reference.color_moments);
+    for (layer, (got, want)) in bench.weights("mlp_first")?.iter().zip(moments).enumerate() {
+        let used = got.get(..want.first.len()).unwrap_or(got);
+        tally.all(&format!("{name}: gradient of layer {layer}"), used, &want.first);
+    }
+    Ok(())
+}
+
+/// Adam's first step is the gradient's sign: only gradients well above rounding decide it.
+fn compare_parameters(
+    tally: &mut Tally,
+    name: &str,
+    [before, now]: [&Model; 2],
+    reference: &Training,
+    want: &BatchOutput,
+) {
+    let mut compare = |part: &str, got: &[f64], want: &[f64], gradient: &[f64]| {
+        let least = 1e-3 * largest(gradient);
+        let clear = (0..gradient.len()).filter(|&i| gradient[i].abs() > least);
+        clear
+            .for_each(|i| tally.value(got[i], want[i], 1.0, || format!("{name}: {part} {i} after the step")));
+    };
+    let (gradients, trained) = (&want.gradients, &reference.model);
+    compare("table entry", &now.table, &trained.table, &gradients.table);
+    for (part, now, then, gradients) in [
+        ("weight of the density network", &now.density, &trained.density, &gradients.density),
+        ("weight of the colour network", &now.color, &trained.color, &gradients.color),
+    ] {
+        for ((now, then), gradient) in now.layers.iter().zip(&then.layers).zip(gradients) {
+            compare(part, &now.weights, &then.weights, gradient);
+        }
+    }
+    let mut untouched = (0..before.table.len()).filter(|&i| gradients.table[i] == 0.0);
+    let same = untouched.all(|i| before.table[i] == now.table[i]);
+    tally.holds(same, || format!("{name}: table entries that no sample touches"));
+}
+
+impl TinyTraining {
+    /// A trainer on three small images.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold it or refuses a kernel.
+    pub fn new(subject: &Subject, setup: Setup) -> Result<Self> {
+        let mut setup = subject.setup(setup);
+        let cameras = cameras();
+        setup.needs.cameras = cameras.len();
+        setup.config.optimizer = Optimizer::default();
+        // High enough that every batch has light samples, of which some are dropped.
+        setup.config.selection =
+            Selection { weight_floor: 0.05, keep_probability: 0.5, stop_transmittance: 1e-4 };
+        setup.config.batch.kept = 1024;
+        setup.config.batch.samples = 4096;
+        let mut random = Random::new(80);
+        let hdr = setup.needs.hdr;
+        let images: Vec<Image> = cameras.iter().map(|camera| image(&mut random, camera, hdr)).collect();
+        let cascades = setup.needs.cascades;
+        let bounds = Bounds { center: DVec3::splat(0.5), half: 0.5, cascades, source: String::new() };
+        let plan = setup.plan(&subject.gpu)?;
+        let views = Views { cameras: &cameras, images: &images, bounds: &bounds };
+        let trainer = Trainer::new(&subject.gpu, plan.clone(), &views)?;
+        let bench = Workbench::of(&subject.gpu, plan, trainer.workspace().clone())?;
+        Ok(Self { trainer, bench })
+    }
+
+    /// The reference, with the parameters that are on the device.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn reference(&self) -> Result<Training> {
+        let config = &self.bench.plan.config.optimizer;
+        let mut training = Training::new(self.bench.model()?, self.bench.objective());
+        let constants = |l2, skip_zero| Adam {
+            beta1: config.beta_1,
+            beta2: config.beta_2,
+            epsilon: config.epsilon,
+            l2,
+            skip_zero,
+        };
+        training.table_adam = constants(0.0, true);
+        training.mlp_adam = constants(config.l2, false);
+        Ok(training)
+    }
+
+    /// One step; its loss, and the batch that it used.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn step(&mut self) -> Result<(f64, Vec<TrainingRay>)> {
+        self.trainer.step(LEARNING_RATE, None)?;
+        let stats = self.trainer.report()?;
+        Ok((stats.loss, self.batch()?))
+    }
+
+    /// How many of the last step's kept samples stand for others too.
+    fn lengthened(&self) -> Result<usize> {
+        let counters = self.bench.counters()?;
+        let samples: Vec<[f32; 4]> = self.bench.read("samples", counters.samples as usize)?;
+        let kept = self.bench.kept(counters.kept as usize)?;
+        let step = |sample: u32| samples.get(sample as usize).map_or(f32::MAX, |sample| sample[3]);
+        Ok(kept.iter().filter(|kept| kept.delta > 1.01 * step(kept.sample)).count())
+    }
+
+    /// The kept samples of the last step, its targets and backgrounds.
+    fn batch(&self) -> Result<Vec<TrainingRay>> {
+        let bench = &self.bench;
+        let counters = bench.counters()?;
+        let rays = counters.rays_used as usize;
+        let samples: Vec<[f32; 4]> = bench.read("samples", counters.samples as usize)?;
+        let kept = bench.kept(counters.kept as usize)?;
+        let spans: Vec<[u32; 2]> = bench.read("kept_spans", rays)?;
+        let directions = bench.rays(rays)?;
+        let targets: Vec<[f32; 4]> = bench.read("targets", rays)?;
+        let backgrounds: Vec<[f32; 4]> = bench.read("backgrounds", rays)?;
+        let vector = |x: &[f32; 4]| DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
+        let sample = |kept: &super::Kept| RaySample {
+            position: samples.get(kept.sample as usize).map_or(DVec3::NAN, vector),
+            delta: f64::from(kept.delta),
+            gain: 1.0,
+        };
+        let of_ray = |[first, count]: [u32; 2]| {
+            kept.iter().skip(first as usize).take(count as usize).map(sample).collect()
+        };
+        Ok((0..rays)
+            .map(|ray| TrainingRay {
+                direction: vector(&directions[ray][1]),
+                samples: of_ray(spans[ray]),
+                target: targets[ray].map(f64::from),
+                background: vector(&backgrounds[ray]).to_array(),
+            })
+            .collect())
+    }
+}
+
+/// Cameras of different sizes around the unit cube that look at its centre.
+fn cameras() -> Vec<Camera> {
+    let eyes = [DVec3::new(2.0, 0.3, 0.4), DVec3::new(0.3, -1.2, 0.8), DVec3::new(0.6, 0.7, 2.1)];
+    let sizes = [(13, 9), (8, 8), (5, 11)];
+    (eyes.into_iter().zip(sizes))
+        .map(|(eye, (width, height))| {
+            let back = (eye - DVec3::splat(0.5)).normalize();
+            let right = back.any_orthonormal_vector();
+            let matrix = DMat3::from_cols(right, back.cross(right), back);
+            Camera {
+                width,
+                height,
+                focal_px: DVec2::splat(1.2 * f64::from(width)),
+                center_px: DVec2::new(f64::from(width), f64::from(height)) / 2.0,
+                lens: Lens::Pinhole,
+                world_from_camera: DAffine3::from_mat3_translation(matrix, eye),
+            }
+        })
+        .collect()
+}
+
+/// About one colour with a little noise: something that a tiny field can learn.
+fn image(random: &mut Random, camera: &Camera, hdr: bool) -> Image {
+    let count = camera.width * camera.height;
+    let pixels = if hdr {
+        let pixel = |_| [4.0, 2.5, 0.5, 0.9].map(|x| (x * random.number(0.8, 1.0)) as f32);
+        Pixels::Linear((0..count).map(pixel).collect())
+    } else {
+        let pixel = |_| [250.0, 150.0, 20.0, 230.0].map(|x| (x * random.number(0.8, 1.0)) as u8);
+        Pixels::Srgb8((0..count).map(pixel).collect())
+    };
+    Image { width: camera.width, height: camera.height, pixels, has_alpha: true }
+}

@@ -1,0 +1,101 @@
+//! A whole view through the renderer.
+
+use super::draw::Random;
+use super::marching::reference;
+use super::{Setup, Subject, Tally, Workbench};
+use crate::camera::{Camera, Lens};
+use crate::dataset::Bounds;
+use crate::reference::composite::{mean_depth, opacity, optical_depth, transmittances};
+use crate::reference::march::BoxRay;
+use crate::render::Renderer;
+use anyhow::Result;
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+
+/// Transmittance at which a ray ends.
+const STOP: f64 = 1e-4;
+/// Size of the view.
+const SIZE: (u32, u32) = (11, 9);
+
+/// Colour, opacity and depth of every pixel: of a bounded scene, and of one with cascades, linear light and a lens.
+///
+/// # Errors
+/// When the device was lost or refuses a kernel.
+pub fn rendered_views(subject: &Subject) -> Result<Tally> {
+    let mut tally = Tally::new(
+        "rendered views",
+        2e-4,
+        "a ray may end one sample earlier or later, at a transmittance of 1e-4",
+    );
+    let lens = Lens::OpenCv { k: [-0.1, 0.02, 0.0, 0.0], p: [1e-3, -1e-3] };
+    for (cascades, hdr, lens) in [(1, false, Lens::Pinhole), (3, true, lens)] {
+        let mut setup = Setup::tiny().network(32, 2).hdr(hdr);
+        setup.needs.cascades = cascades;
+        setup.config.selection.stop_transmittance = STOP;
+        let bench = subject.workbench(setup)?;
+        bench.randomise(&mut Random::new(90), 2.0, 1.5)?;
+        bench.write("occupancy_bits", &vec![u32::MAX; bench.plan.cell_count() / 32]);
+        let bounds =
+            Bounds { center: DVec3::new(1.0, 2.0, 3.0), half: 0.75, cascades, source: String::new() };
+        compare(&mut tally, &bench, &bounds, &camera(&bounds, lens))?;
+    }
+    Ok(tally)
+}
+
+fn camera(bounds: &Bounds, lens: Lens) -> Camera {
+    let back = DVec3::new(0.3, -0.2, 1.0).normalize();
+    let right = back.any_orthonormal_vector();
+    Camera {
+        width: SIZE.0,
+        height: SIZE.1,
+        focal_px: DVec2::splat(13.0),
+        center_px: DVec2::new(5.0, 4.0),
+        lens,
+        world_from_camera: DAffine3::from_mat3_translation(
+            DMat3::from_cols(right, back.cross(right), back),
+            bounds.center + 1.2 * back * bounds.outer_half(),
+        ),
+    }
+}
+
+fn compare(tally: &mut Tally, bench: &Workbench, bounds: &Bounds, camera: &Camera) -> Result<()> {
+    let linked = camera.lens != Lens::Pinhole;
+    let view = Renderer::new(&bench.gpu, &bench.plan, &bench.workspace, bounds, linked)?.render(camera)?;
+    let case = format!("{} cascades", bounds.cascades);
+    let (colors, depths) = expected(bench, bounds, camera)?;
+    tally.holds((view.width, view.height) == SIZE, || format!("{case}: size"));
+    tally.each(&format!("{case}, colour"), view.color.as_flattened(), &colors, |i| 1.0 + colors[i].abs());
+    tally.each(&format!("{case}, depth"), &view.depth, &depths, |i| 1.0 + depths[i]);
+    tally.holds(depths.iter().any(|&z| z > 0.0), || format!("{case}: all is transparent"));
+    Ok(())
+}
+
+/// What the reference sees: colour and opacity `[pixels, 4]`, and depth.
+fn expected(bench: &Workbench, bounds: &Bounds, camera: &Camera) -> Result<(Vec<f64>, Vec<f64>)> {
+    let march = reference(bench);
+    let words = vec![u32::MAX; bench.plan.cell_count() / 32];
+    let (model, objective) = (bench.model()?, bench.objective());
+    let side = 2.0 * bounds.outer_half();
+    let (mut colors, mut depths) = (Vec::new(), Vec::new());
+    for index in 0..SIZE.0 * SIZE.1 {
+        let pixel = DVec2::new(f64::from(index % SIZE.0) + 0.5, f64::from(index / SIZE.0) + 0.5);
+        let Some(ray) = camera.ray(pixel) else { continue };
+        let in_box = BoxRay { origin: (ray.origin - bounds.min()) / side, direction: ray.direction };
+        let (mut taus, mut values, mut z) = (Vec::new(), Vec::new(), Vec::new());
+        for sample in march.samples(in_box, 0.5, &words) {
+            if (-taus.iter().sum::<f64>()).exp() < STOP {
+                break;
+            }
+            let (s, color) = model.query(objective.color_range, sample.position, ray.direction);
+            taus.push(optical_depth(s, sample.delta));
+            values.push(color);
+            z.push((sample.position - in_box.origin).dot(camera.forward()) * side);
+        }
+        let weights: Vec<f64> = (transmittances(objective.transmittance, &taus).iter().zip(&taus))
+            .map(|(t, &tau)| t * opacity(tau))
+            .collect();
+        let channel = |x: usize| weights.iter().zip(&values).map(|(w, c)| w * c[x]).sum::<f64>();
+        colors.extend([channel(0), channel(1), channel(2), weights.iter().sum()]);
+        depths.push(mean_depth(&weights, &z));
+    }
+    Ok((colors, depths))
+}

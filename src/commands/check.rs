@@ -1,0 +1,131 @@
+//! `nerf check`: every kernel on this adapter against the reference, or golden rays from a file.
+
+use super::{Failed, Session};
+use crate::cli::{self, AccumulationName, MemoryName, ProductName};
+use crate::progress::{Progress, duration};
+use anyhow::Result;
+use nerf::check::fused::{BOUND, golden_rays};
+use nerf::check::{self, Forced, Subject, Tally};
+use nerf::config::Accumulation;
+use nerf::gpu::tensor::Memory;
+use nerf::kernels::layer::Product;
+use nerf::reference::vectors::{GoldenFile, RayError};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::time::Instant;
+
+pub(super) fn run(args: &cli::Check, session: &Session<'_>) -> Result<()> {
+    let file = args.vectors.as_deref().map(GoldenFile::load).transpose()?;
+    let gpu = session.open_gpu()?;
+    let subject = Subject::new(&gpu, forced(args))?;
+    let heading = format!("adapter  {}\npath     {}", gpu.info.name, subject.describe()?);
+    if session.global.json {
+        session.remarks.say(&heading);
+    }
+    match (&args.vectors, &file) {
+        (Some(path), Some(file)) => rays(&subject, file, path, &heading, session),
+        _ => kernels(&subject, &heading, session),
+    }
+}
+
+fn forced(args: &cli::Check) -> Forced {
+    let rows = |rows| Some(Product { rows, shared_weights: false });
+    Forced {
+        accumulation: match args.accumulation {
+            AccumulationName::Auto => None,
+            AccumulationName::Ordered => Some(Accumulation::Ordered),
+            AccumulationName::Fixed => Some(Accumulation::Fixed),
+            AccumulationName::Float => Some(Accumulation::Float),
+            AccumulationName::Exchange => Some(Accumulation::Exchange),
+        },
+        memory: match args.memory {
+            MemoryName::Auto => None,
+            MemoryName::Buffers => Some(Memory::Buffers),
+            MemoryName::Textures => Some(Memory::Textures),
+        },
+        product: match args.product {
+            ProductName::Auto => None,
+            ProductName::Shared => Some(Product { rows: 4, shared_weights: true }),
+            ProductName::One => rows(1),
+            ProductName::Two => rows(2),
+            ProductName::Four => rows(4),
+        },
+    }
+}
+
+/// Checks all kernels and prints the table.
+fn kernels(subject: &Subject, heading: &str, session: &Session<'_>) -> Result<()> {
+    let start = Instant::now();
+    let progress = Progress::new(session.remarks, "checking");
+    let tallies = check::run(subject, &|done, all, name| {
+        progress.update(done as f64 / all as f64, || format!("{name} ({} of {all})", done + 1));
+    })?;
+    drop(progress);
+    let broken = tallies.iter().filter(|tally| !tally.pass).count();
+    let worst = tallies.iter().fold(0.0, |worst: f64, tally| worst.max(tally.worst));
+    let mut lines = vec![heading.to_owned(), table(&tallies)];
+    let time = duration(start.elapsed().as_secs_f64());
+    let verdict = match broken {
+        0 => format!("all {} bounds are kept", tallies.len()),
+        _ => format!("{broken} of {} bounds are broken", tallies.len()),
+    };
+    lines.push(format!("{verdict}; the checks took {time}"));
+    let result = json!({
+        "adapter": subject.gpu.info.name, "pass": broken == 0, "worst": worst, "kernels": tallies, "rays": []
+    });
+    finish(session, &result, &lines.join("\n"), broken == 0, verdict)
+}
+
+/// One line per tally, and under it the worst case of one whose bound is broken.
+fn table(tallies: &[Tally]) -> String {
+    let width = tallies.iter().map(|tally| tally.name.chars().count()).max().unwrap_or(0);
+    let mut lines =
+        vec![format!("{:width$}  {:>8}  {:>8}  {:>8}        bound by", "kernel", "cases", "worst", "bound")];
+    for Tally { name, cases, worst, bound, pass, source, case } in tallies {
+        let verdict = if *pass { "pass" } else { "FAIL" };
+        lines.push(format!("{name:width$}  {cases:>8}  {worst:>8.1e}  {bound:>8.1e}  {verdict}  {source}"));
+        if !pass {
+            lines.push(format!("{:width$}  worst: {case}", ""));
+        }
+    }
+    lines.join("\n")
+}
+
+/// Checks the rays of a file and prints them.
+fn rays(
+    subject: &Subject,
+    file: &GoldenFile,
+    path: &Path,
+    heading: &str,
+    session: &Session<'_>,
+) -> Result<()> {
+    let errors = golden_rays(subject, file)?;
+    let pass = |error: &RayError| error.finite && error.error <= BOUND;
+    let broken = errors.iter().filter(|error| !pass(error)).count();
+    let worst = errors.iter().fold(0.0, |worst: f64, error| worst.max(error.error));
+    let named = || file.rays.iter().map(|ray| ray.name.as_str()).zip(&errors);
+    let entries: Vec<Value> = named()
+        .map(|(name, error)| json!({ "name": name, "error": error.error, "finite": error.finite }))
+        .collect();
+    let width = named().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max(3);
+    let mut lines = vec![heading.to_owned(), format!("{:width$}     error        worst in", "ray")];
+    lines.extend(named().map(|(name, error)| {
+        let verdict = if pass(error) { "pass" } else { "FAIL" };
+        format!("{name:width$}  {:>8.1e}  {verdict}  {}", error.error, error.quantity)
+    }));
+    let count = errors.len();
+    let verdict = match broken {
+        0 => format!("all {count} rays of {} are within {BOUND:.0e}", path.display()),
+        _ => format!("{broken} of {count} rays of {} are beyond {BOUND:.0e}", path.display()),
+    };
+    lines.push(format!("{verdict}; worst {worst:.1e}, {:?} transmittance", file.transmittance));
+    let result = json!({
+        "adapter": subject.gpu.info.name, "pass": broken == 0, "worst": worst, "kernels": [], "rays": entries
+    });
+    finish(session, &result, &lines.join("\n"), broken == 0, verdict)
+}
+
+fn finish(session: &Session<'_>, json: &Value, text: &str, pass: bool, verdict: String) -> Result<()> {
+    session.print(json, text)?;
+    if pass { Ok(()) } else { Err(Failed(verdict).into()) }
+}
