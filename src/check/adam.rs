@@ -57,7 +57,7 @@ fn gradients(random: &mut Random, count: usize) -> Vec<f32> {
 }
 
 fn table(bench: &Workbench) -> Result<Tally> {
-    let mut tally = Tally::new("Adam: table", 2e-6, "four roundings per step and moment, six steps");
+    let mut tally = Tally::new("Adam: table", 3e-6, "four roundings per step and moment, six steps");
     let stages = training::update(&bench.gpu, &bench.plan, &bench.workspace)?;
     let mut random = Random::new(70);
     let count = bench.plan.layout.entries * 2;

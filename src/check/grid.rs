@@ -16,7 +16,7 @@ use glam::DVec3;
 /// When the device was lost or refuses a kernel.
 pub fn features(subject: &Subject) -> Result<Tally> {
     let mut tally =
-        Tally::new("hash grid: features", 5e-7, "a position in cells rounds to half a unit per axis");
+        Tally::new("hash grid: features", 3.6e-7, "a position in cells rounds to half a unit per axis");
     for finest in [40, 2048] {
         let bench = subject.workbench(Setup { finest, ..Setup::tiny() })?;
         let mut random = Random::new(10);

@@ -13,7 +13,7 @@ use glam::DVec3;
 /// # Errors
 /// When the device was lost or refuses the kernel.
 pub fn harmonics(subject: &Subject) -> Result<Tally> {
-    let mut tally = Tally::new("harmonics", 3.6e-7, "six roundings in three factors and a difference");
+    let mut tally = Tally::new("harmonics", 1.8e-7, "three roundings of terms of up to 1");
     let bench = subject.workbench(Setup::tiny())?;
     let mut random = Random::new(42);
     let directions = directions(&mut random, bench.plan.config.batch.rays);
@@ -36,7 +36,7 @@ pub fn harmonics(subject: &Subject) -> Result<Tally> {
         tally.holds(copied == &features[sample..sample + DENSITY_OUTPUTS], || {
             format!("features of ray {ray}")
         });
-        // No term is larger than 2.9, and what is summed in it is not much larger than 1.
+        // No term is much larger than 1, nor what is summed in it.
         tally.each(&format!("direction {direction}"), terms, &reference(*direction), |_| 1.0);
     }
     Ok(tally)

@@ -45,7 +45,7 @@ pub fn marched_samples(subject: &Subject) -> Result<Vec<Tally>> {
         ),
         steps: Tally::new(
             "marching: steps",
-            1e-4,
+            1e-5,
             "differences of two distances, where a step spans two parts of the cone",
         ),
         agreeing: 0,
@@ -187,7 +187,7 @@ impl Ray<'_> {
             previous = Some(step.round());
             match unmatched.iter().position(|want| f64::from(want.step) == step.round()) {
                 Some(at) => {
-                    self.compare_sample(found, position, sample[3].into(), unmatched.remove(at), case)
+                    self.compare_sample(found, position, sample[3].into(), unmatched.remove(at), case);
                 }
                 None => {
                     let [t, _] = march.step(t_near, start, step.round().max(0.0) as u32);

@@ -53,15 +53,15 @@ pub fn networks(subject: &Subject, shapes: &[Shape]) -> Result<Vec<Tally>> {
     let values = "sums of up to 64 terms in 2 layers round; relative to the largest value";
     let gradients = "sums over up to 130 samples and 5 layers round; relative to the largest gradient";
     let mut tallies = Tallies {
-        density: Tally::new("density network", 3e-6, values),
+        density: Tally::new("density network", 5e-6, values),
         color: Tally::new(
             "colour network",
-            3e-6,
+            5e-6,
             "sums of up to 64 terms in 5 layers round; relative to the largest",
         ),
-        rays: Tally::new("rendered batch and its loss", 3e-6, "as colours, whose means they are"),
-        weights: Tally::new("gradients of both networks", 1e-5, gradients),
-        table: Tally::new("hash grid: scattered gradients", 1e-5, gradients),
+        rays: Tally::new("rendered batch and its loss", 1e-5, "as colours; squares double their errors"),
+        weights: Tally::new("gradients of both networks", 2e-5, gradients),
+        table: Tally::new("hash grid: scattered gradients", 2e-5, gradients),
     };
     for shape in shapes {
         let bench = workbench(subject, shape)?;

@@ -95,10 +95,10 @@ fn is_close_to_a_fold(camera: &Camera, pixel: DVec2) -> bool {
 /// # Errors
 /// When the device was lost or refuses a kernel.
 pub fn view_rays(subject: &Subject) -> Result<Vec<Tally>> {
-    let mut rays = Tally::new("rays of a view", 1e-6, "a rotation, a unit vector and six quotients round");
+    let mut rays = Tally::new("rays of a view", 6e-7, "a rotation, a unit vector and six quotients round");
     let mut trips = Tally::new(
         "lens: round trips",
-        1e-6,
+        6e-7,
         "pixels over the focal length; Newton's method stops within 1e-7 of the image plane",
     );
     let mut random = Random::new(40);
@@ -238,7 +238,7 @@ struct Images {
 /// When the device was lost or refuses a kernel.
 pub fn training_rays(subject: &Subject) -> Result<Tally> {
     let mut tally =
-        Tally::new("rays of a training", 1e-6, "a rotation, a unit vector, a product of colours round");
+        Tally::new("rays of a training", 4e-7, "a rotation, a unit vector, a product of colours round");
     let backgrounds =
         [Background::Black, Background::Random, Background::Random, Background::Color([0.25, 0.5, 0.75])];
     let kinds = [(false, true), (true, true), (false, true), (false, false)];

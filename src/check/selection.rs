@@ -27,7 +27,7 @@ pub struct Selecting {
 /// When the device was lost or refuses a kernel.
 pub fn selected_samples(subject: &Subject) -> Result<Tally> {
     let mut tally =
-        Tally::new("selection", 1e-5, "a weight over the floor, and its sum along the ray, round");
+        Tally::new("selection", 3e-6, "a weight over the floor, and its sum along the ray, round");
     let mut random = Random::new(30);
     let ordinary = Selecting::new(subject, setup())?;
     for (rays, samples) in [(3, 0), (1, 1), (2, 3), (9, 65), (33, 130), (200, 250)] {

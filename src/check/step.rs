@@ -11,7 +11,7 @@ use crate::reference::Transmittance;
 use crate::reference::adam::Adam;
 use crate::reference::model::{BatchOutput, Model, RaySample, TrainingRay};
 use crate::reference::step::Training;
-use crate::train::{Trainer, Views};
+use crate::train::{StepStats, Trainer, Views};
 use anyhow::Result;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -49,22 +49,52 @@ pub fn setups() -> [(&'static str, Setup); 4] {
 /// When the device was lost or refuses a kernel.
 pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
     let mut tally =
-        Tally::new("one whole step", 5e-5, "gradients of all kernels, relative to the largest of their kind");
+        Tally::new("one whole step", 5e-6, "gradients of all kernels, relative to the largest of their kind");
     for (name, setup) in setups {
         let mut tiny = TinyTraining::new(subject, setup.clone())?;
         // Larger features than the initial ones, so that every gradient matters.
         tiny.bench.randomise(&mut Random::new(81), 0.5, 1.0)?;
         let mut reference = tiny.reference()?;
         let before = reference.model.clone();
-        let (loss, batch) = tiny.step()?;
+        let (stats, batch) = tiny.step()?;
+        let samples: usize = batch.iter().map(|ray| ray.samples.len()).sum();
+        let counted = [stats.steps, stats.skipped] == [1, 0]
+            && stats.rays == batch.len() as u64
+            && stats.samples == samples as u64;
+        tally.holds(counted, || format!("{name}: {stats:?}, {} rays, {samples} samples", batch.len()));
         let filled = batch.len() >= 16 && batch.iter().any(|ray| ray.samples.len() > 3);
         tally.holds(filled && tiny.lengthened()? > 3, || format!("{name}: a thin batch"));
         let want = reference.step(&batch, LEARNING_RATE);
-        tally.value(loss, want.loss, want.loss, || format!("{name}: loss"));
+        tally.value(stats.loss, want.loss, want.loss, || format!("{name}: loss"));
+        let error = color_error(&want, &batch);
+        tally.value(stats.color_error, error, error, || format!("{name}: colour error"));
+        compare_rays(&mut tally, name, &tiny.bench)?;
         compare_moments(&mut tally, name, &tiny.bench, &reference)?;
         compare_parameters(&mut tally, name, [&before, &tiny.bench.model()?], &reference, &want);
     }
     Ok(tally)
+}
+
+/// Mean squared error of red, green and blue.
+fn color_error(output: &BatchOutput, batch: &[TrainingRay]) -> f64 {
+    let squares =
+        |(got, ray): (&[f64; 4], &TrainingRay)| (0..3).map(|x| (got[x] - ray.target[x]).powi(2)).sum::<f64>();
+    let sum: f64 = output.rendered.iter().zip(batch).map(squares).sum();
+    sum / (3.0 * batch.len() as f64)
+}
+
+/// The number of rays of the next step, which follows how many samples this one's rays had.
+fn compare_rays(tally: &mut Tally, name: &str, bench: &Workbench) -> Result<()> {
+    let counters = bench.counters()?;
+    let batch = &bench.plan.config.batch;
+    let asked = f64::from(batch.first_rays);
+    let share = f64::from(counters.rays_used) / asked;
+    let fit_kept = batch.kept as f64 / f64::from(counters.kept_wanted.max(1)) * share;
+    let fit_samples = (batch.samples / 8 * 7) as f64 / f64::from(counters.samples_wanted.max(1));
+    let want = (asked * fit_kept.min(fit_samples).clamp(0.5, 1.5)).clamp(16.0, batch.rays as f64);
+    let got = f64::from(counters.rays);
+    tally.holds((got - want).abs() <= 1.0, || format!("{name}: {got} rays next instead of {want}"));
+    Ok(())
 }
 
 /// β1 = 0.9: the first moment is a tenth of the gradient.
@@ -154,14 +184,13 @@ impl TinyTraining {
         Ok(training)
     }
 
-    /// One step; its loss, and the batch that it used.
+    /// One step; what the trainer reports of it, and the batch that it used.
     ///
     /// # Errors
     /// When the device was lost.
-    pub fn step(&mut self) -> Result<(f64, Vec<TrainingRay>)> {
+    pub fn step(&mut self) -> Result<(StepStats, Vec<TrainingRay>)> {
         self.trainer.step(LEARNING_RATE, None)?;
-        let stats = self.trainer.report()?;
-        Ok((stats.loss, self.batch()?))
+        Ok((self.trainer.report()?, self.batch()?))
     }
 
     /// How many of the last step's kept samples stand for others too.

@@ -78,23 +78,27 @@ impl Subject {
     /// Never: the plan is a valid one.
     pub fn describe(&self) -> Result<String> {
         let Plan { accumulation, memory, product, .. } = self.setup(Setup::tiny()).plan(&self.gpu)?;
-        let kind = if self.gpu.is_cpu() { "a CPU adapter" } else { "a GPU" };
-        let why =
-            |is_forced: bool| if is_forced { "asked for".into() } else { format!("the choice for {kind}") };
         let memory = match memory {
             Memory::Buffers => "tensors in buffers",
             Memory::Textures => "tensors in textures",
         };
-        let rows = if product.rows == 1 { "row" } else { "rows" };
-        let weights = if product.shared_weights { " and shared weights" } else { "" };
-        let Forced { accumulation: forced_sum, memory: forced_memory, product: forced_product } = self.forced;
-        Ok(format!(
-            "{} ({}), {memory} ({}), matrix products of {} {rows} per thread{weights} ({})",
-            accumulation_name(accumulation),
-            why(forced_sum.is_some_and(|sum| sum != Accumulation::Auto)),
-            why(forced_memory.is_some()),
-            product.rows,
-            why(forced_product.is_some()),
-        ))
+        let rows = match product {
+            Product { shared_weights: true, rows } => format!("{rows} rows and shared weights"),
+            Product { rows: 1, .. } => "1 row".into(),
+            Product { rows, .. } => format!("{rows} rows"),
+        };
+        let parts = [
+            (accumulation_name(accumulation).to_owned(), self.forced.accumulation.is_some()),
+            (memory.to_owned(), self.forced.memory.is_some()),
+            (format!("matrix products of {rows} per thread"), self.forced.product.is_some()),
+        ];
+        let kind = if self.gpu.is_cpu() { "a CPU adapter" } else { "a GPU" };
+        let why = match parts.iter().filter(|(_, is_forced)| *is_forced).count() {
+            0 => format!(": what a training takes on {kind}"),
+            3 => String::new(),
+            _ => format!("; the rest is what a training takes on {kind}"),
+        };
+        let named = parts.map(|(name, is_forced)| name + if is_forced { " (asked for)" } else { "" });
+        Ok(named.join(", ") + &why)
     }
 }

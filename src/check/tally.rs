@@ -42,9 +42,9 @@ impl Tally {
     /// Counts an error that was measured elsewhere.
     pub fn error(&mut self, error: f64, case: impl FnOnce() -> String) {
         self.cases += 1;
-        // Phrased so that anything not a number is the worst.
-        if !(error <= self.worst) {
-            self.worst = if error.is_nan() { NOT_FINITE } else { error };
+        let error = if error.is_nan() { NOT_FINITE } else { error };
+        if error > self.worst {
+            self.worst = error;
             self.case = case();
         }
         self.pass = self.worst <= self.bound;

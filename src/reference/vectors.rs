@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -158,10 +158,13 @@ impl GoldenRay {
             ("delta", &ray.delta),
             ("c", color),
             ("gt", &ray.gt),
+            ("gt_alpha", &[ray.gt_alpha]),
             ("background", &ray.background),
         ] {
-            let beyond = values.iter().find(|value| !(value.abs() <= f64::from(f32::MAX)));
-            ensure!(beyond.is_none(), "{name} holds {beyond:?}, expected numbers of single precision");
+            let most = f64::from(f32::MAX);
+            if let Some(value) = values.iter().find(|value| value.abs() > most) {
+                bail!("{name} holds {value:e}, expected numbers of single precision, up to {most:.2e}");
+            }
         }
         Ok(ray)
     }

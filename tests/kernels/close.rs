@@ -33,17 +33,7 @@ where
     );
 }
 
-/// The largest magnitude, at least 1e-30: what the error of a gradient is relative to.
-pub(crate) fn largest<T: Copy + Into<f64>>(values: &[T]) -> f64 {
+/// The largest magnitude, at least 1e-30.
+fn largest<T: Copy + Into<f64>>(values: &[T]) -> f64 {
     values.iter().fold(1e-30, |most, &value| most.max(value.into().abs()))
-}
-
-/// As [`assert_close`], relative to the largest value wanted.
-#[track_caller]
-pub(crate) fn assert_close_to_scale<G, W>(name: &str, got: &[G], want: &[W], tolerance: f64)
-where
-    G: Copy + Into<f64>,
-    W: Copy + Into<f64>,
-{
-    assert_close(name, got, want, tolerance * largest(want), 0.0);
 }
