@@ -1,6 +1,7 @@
 //! The command line: types only. Their doc comments are the help.
 
 pub(crate) mod bench;
+pub(crate) mod check;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::config::Background;
@@ -57,7 +58,7 @@ pub(crate) enum Command {
     #[command(subcommand)]
     Bench(bench::Bench),
     /// Compare every kernel with a reference in double precision, on this adapter
-    Check(Check),
+    Check(check::Check),
     /// List the adapters of this machine
     Adapters,
 }
@@ -220,68 +221,6 @@ pub(crate) struct Generate {
     /// Varies where the cameras are
     #[arg(long, value_name = "K", default_value = "0")]
     pub(crate) seed: u64,
-}
-
-/// `nerf check`
-#[derive(Args, Debug)]
-pub(crate) struct Check {
-    /// Check only the rays of this file of golden rays: what the fused kernel of rendering, loss and gradient makes
-    /// of them
-    #[arg(long, value_name = "FILE")]
-    pub(crate) vectors: Option<PathBuf>,
-    /// How gradients of the hash table are summed
-    #[arg(long, value_enum, default_value = "auto")]
-    pub(crate) accumulation: AccumulationName,
-    /// Where tensors live
-    #[arg(long, value_enum, default_value = "auto")]
-    pub(crate) memory: MemoryName,
-    /// How the networks are multiplied: rows per thread, or shared weights
-    #[arg(long, value_enum, default_value = "auto")]
-    pub(crate) product: ProductName,
-}
-
-/// An accumulation by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum AccumulationName {
-    /// What a training takes on this adapter
-    Auto,
-    /// In the order of the samples, without atomics
-    Ordered,
-    /// As integers, independent of order
-    Fixed,
-    /// By float atomics
-    Float,
-    /// By compare-and-exchange
-    Exchange,
-}
-
-/// A memory by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum MemoryName {
-    /// What a training takes on this adapter
-    Auto,
-    /// Storage buffers
-    Buffers,
-    /// Textures
-    Textures,
-}
-
-/// A matrix product by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ProductName {
-    /// What a training takes on this adapter
-    Auto,
-    /// Four rows per thread, and threads that read weights together
-    Shared,
-    /// One row per thread
-    #[value(name = "1")]
-    One,
-    /// Two rows per thread
-    #[value(name = "2")]
-    Two,
-    /// Four rows per thread
-    #[value(name = "4")]
-    Four,
 }
 
 /// A file format to render to.

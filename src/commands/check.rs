@@ -1,7 +1,7 @@
 //! `nerf check`: every kernel on this adapter against the reference, or golden rays from a file.
 
 use super::{Failed, Session};
-use crate::cli::{self, AccumulationName, MemoryName, ProductName};
+use crate::cli::check::{AccumulationName, Check, MemoryName, ProductName};
 use crate::progress::{Progress, duration};
 use anyhow::Result;
 use nerf::check::fused::{BOUND, golden_rays};
@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 use std::time::Instant;
 
-pub(super) fn run(args: &cli::Check, session: &Session<'_>) -> Result<()> {
+pub(super) fn run(args: &Check, session: &Session<'_>) -> Result<()> {
     let file = args.vectors.as_deref().map(GoldenFile::load).transpose()?;
     let gpu = session.open_gpu()?;
     let subject = Subject::new(&gpu, forced(args))?;
@@ -28,7 +28,7 @@ pub(super) fn run(args: &cli::Check, session: &Session<'_>) -> Result<()> {
     }
 }
 
-fn forced(args: &cli::Check) -> Forced {
+fn forced(args: &Check) -> Forced {
     let rows = |rows| Some(Product { rows, shared_weights: false });
     Forced {
         accumulation: match args.accumulation {
