@@ -1,13 +1,13 @@
 //! `nerf bench equations`: the printed equations next to those in use, as tables.
 
-mod kernel;
 mod stiff;
 
 use super::{circumstances, joined, markdown, write_json, write_text};
 use crate::cli::bench::Equations;
 use crate::commands::{Session, writable_folder};
 use anyhow::Result;
-use kernel::composited;
+use nerf::check::fused::Fused;
+use nerf::check::{Forced, Subject};
 use nerf::gpu::Gpu;
 use nerf::reference::Transmittance;
 use nerf::reference::composite::{CompositeInput, CompositeOutput, composite};
@@ -117,6 +117,16 @@ fn slabs(gpu: &Arc<Gpu>) -> Result<Vec<Slab>> {
         Slab { optical_depth, samples, exact: -(-optical_depth).exp_m1(), exclusive, inclusive }
     };
     Ok(cases.into_iter().zip(opacities).map(slab).collect())
+}
+
+/// What the fused kernel makes of `rays`.
+fn composited(
+    gpu: &Arc<Gpu>,
+    convention: Transmittance,
+    rays: &[CompositeInput<'_>],
+) -> Result<Vec<CompositeOutput>> {
+    let longest = rays.iter().map(|ray| ray.s.len()).max().unwrap_or(0);
+    Fused::new(&Subject::new(gpu, Forced::default())?, convention, longest)?.run(rays)
 }
 
 /// The rays of a file by name, in the order in which the names appear.
