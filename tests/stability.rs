@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use nerf::camera::{Camera, Lens};
-use nerf::config::{Batch, Config, Grid, March, Network, Occupancy};
+use nerf::config::{Accumulation, Batch, Config, Grid, March, Network, Occupancy};
 use nerf::dataset::Bounds;
 use nerf::gpu::{Gpu, adapter};
 use nerf::image::{Image, Pixels};
@@ -257,6 +257,11 @@ fn targets_of_high_dynamic_range() {
     let scene = |image| Scene { image, has_alpha: false, ..Scene::default() };
     let bright = scene(|w, h| linear([1e5, 3e4, 1e-5, 1.0], w, h)).train().survives(200);
     assert!(bright.loss < 1e8, "{bright:?}");
+    // Integers hold the same gradients: their scale follows the largest.
+    let config = Config { accumulation: Accumulation::Fixed, ..config() };
+    let image = |w, h| linear([1e5, 3e4, 1e-5, 1.0], w, h);
+    let integers = scene(image).train_with(config).survives(200);
+    assert!((integers.loss / bright.loss - 1.0).abs() < 0.1, "{integers:?} {bright:?}");
     let dim = scene(|w, h| linear([1e-5, 1e-6, 0.0, 1.0], w, h)).train().survives(200);
     assert!(dim.loss < 0.01, "{dim:?}");
 }
