@@ -53,18 +53,17 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let alpha = opacity(tau);
         let passing_root = exp_accurate(-0.5 * tau);
         let color = vec4(color_load(i - 1u).rgb, 1.0);
-        let d_s = tau * dot(d_result, gradient_color(alpha, color, behind.value));
+        let d_s = tau * dot(d_result, gradient_color(alpha, color, behind));
         let d_c = squared_times(known.y, alpha * d_result).rgb;
         let root = gradient_root(known.y, passing_root);
         d_color_store(i - 1u, vec4(d_c, root * (root * d_s)));
         let own = own_color(passing_root, color);
-        // Many thin samples would wear out B by the rounding of e^-tau. Both forms leave a B that equals the sample's
-        // colour as it is, so that nothing is learnt from rounding where all is one colour.
-        let difference = own - behind.value;
+        // e^-tau rounds, and would wear out the B of many thin samples.
+        let difference = sum_below(own, behind);
         if tau < 0.35 {
             behind = sum_add(behind, alpha * difference, zero);
         } else {
-            behind = sum_of(own - squared_times(passing_root, difference));
+            behind = sum_add(sum_of(own), -squared_times(passing_root, difference), zero);
         }
     }
 }

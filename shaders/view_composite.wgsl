@@ -1,5 +1,5 @@
 // Renders the rays of a view: colour, opacity and mean depth along the view axis.
-// Needs: counters, camera, exp, transmittance.
+// Needs: counters, camera, exp, sum, transmittance.
 
 var<storage, read> counters: Counters;
 var<storage, read> cameras: array<Camera>;

@@ -47,6 +47,7 @@ const RAY_STORE: Part = part!("common/ray_store.wgsl");
 const OCCUPANCY: Part = part!("common/occupancy.wgsl");
 const MARCH_START: Part = part!("common/march_start.wgsl");
 pub(crate) const EXP: Part = part!("common/exp.wgsl");
+const SUM: Part = part!("common/sum.wgsl");
 pub(crate) const DENSITY: Part = part!("common/density.wgsl");
 const GRID: Part = part!("common/grid.wgsl");
 const HARMONICS: Part = part!("common/harmonics.wgsl");

@@ -16,3 +16,8 @@ fn sum_add(sum: Sum, term: vec4<f32>, zero: u32) -> Sum {
     let next = bitcast<vec4<f32>>(bitcast<vec4<u32>>(sum.value + corrected) ^ vec4(zero));
     return Sum(next, (next - sum.value) - corrected);
 }
+
+// value - sum, which loses nothing where both are nearly the same.
+fn sum_below(value: vec4<f32>, sum: Sum) -> vec4<f32> {
+    return (value - sum.value) + sum.lost;
+}

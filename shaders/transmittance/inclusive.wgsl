@@ -11,8 +11,8 @@ fn gradient_root(transmittance_root: f32, passing_root: f32) -> f32 {
     return transmittance_root;
 }
 
-fn gradient_color(alpha: f32, color: vec4<f32>, behind: vec4<f32>) -> vec4<f32> {
-    return (1.0 - 2.0 * alpha) * color - behind;
+fn gradient_color(alpha: f32, color: vec4<f32>, behind: Sum) -> vec4<f32> {
+    return sum_below((1.0 - 2.0 * alpha) * color, behind);
 }
 
 // What the sample adds to the colour seen from in front of it: B_{i-1} = alpha * own_color + e^-tau * B_i.

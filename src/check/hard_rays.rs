@@ -156,9 +156,10 @@ impl HardRay {
             .map(|number| {
                 let samples = lengths[number / Self::KINDS % lengths.len()].min(longest);
                 let mut ray = Self::new(random, number, samples);
-                if number % 7 == 6 {
-                    ray.target = composite(Transmittance::Exclusive, &ray.input(1)).rendered.map(single);
-                    ray.name += ", met";
+                let met = [(6, Transmittance::Exclusive), (3, Transmittance::Inclusive)];
+                for (_, convention) in met.into_iter().filter(|(rest, _)| number % 7 == *rest) {
+                    ray.target = composite(convention, &ray.input(1)).rendered.map(single);
+                    ray.name += &format!(", met if {convention:?}");
                 }
                 ray
             })

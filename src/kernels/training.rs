@@ -4,8 +4,8 @@ use super::color::COLOR_HIDDEN;
 use super::density::{layer_stage, quads};
 use super::marching::{SPARE_ROWS, kept_capacity};
 use super::{
-    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_STORE, STEP, USABLE,
-    Workspace, dispatch,
+    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_STORE, STEP, SUM,
+    USABLE, Workspace, dispatch,
 };
 use crate::config::Accumulation;
 use crate::gpu::Gpu;
@@ -96,8 +96,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -> Result<Stage> {
     let weights = if weights { part!("weights/stored.wgsl") } else { part!("weights/none.wgsl") };
-    let sum = part!("common/sum.wgsl");
-    let parts = [COUNTERS, EXP, sum, plan.transmittance(), weights, part!("composite.wgsl")];
+    let parts = [COUNTERS, EXP, SUM, plan.transmittance(), weights, part!("composite.wgsl")];
     let kernel = plan.kernel(gpu, "composite", &parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }

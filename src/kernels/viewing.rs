@@ -1,6 +1,6 @@
 //! What only rendering needs: a view's rays and its compositing.
 
-use super::{CAMERA, COUNTERS, Camera, EXP, Plan, RAY, RAY_STORE, STEP, Workspace, dispatch};
+use super::{CAMERA, COUNTERS, Camera, EXP, Plan, RAY, RAY_STORE, STEP, SUM, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::pass::Stage;
 use anyhow::Result;
@@ -32,7 +32,8 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [COUNTERS, RAY, CAMERA, plan.lens(), EXP, plan.transmittance(), part!("view_composite.wgsl")];
+    let parts =
+        [COUNTERS, RAY, CAMERA, plan.lens(), EXP, SUM, plan.transmittance(), part!("view_composite.wgsl")];
     let kernel = plan.kernel(gpu, "view composite", &parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }
