@@ -76,7 +76,7 @@ for dataset in "$work/toys" ${datasets[@]+"${datasets[@]}"}; do
 done
 
 printf 'spread over seeds, repeats, and ways of summing\n' >&2
-on_adapter bench training "$work/toys" --out "$work/seeds" --seeds 5 --seconds 30 >"$out/spread_seeds.txt"
+on_adapter bench training "$work/toys" --out "$work/seeds" --seeds 5 --steps 600 >"$out/spread_seeds.txt"
 on_adapter bench training "$work/toys" --out "$work/repeats" --seconds 30 \
     --seed 0 --seed 0 --seed 0 --seed 0 --seed 0 >"$out/spread_repeats.txt"
 sums=()
