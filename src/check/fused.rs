@@ -47,8 +47,8 @@ impl Fused {
         Ok(Self { bench, stage, samples })
     }
 
-    /// What the kernel makes of `rays`. They need not be the whole batch that their `rays_in_batch` counts: they
-    /// are run as many at once as fit.
+    /// What the kernel makes of `rays`. They need not be the batch that their `rays_in_batch` counts, and may be more
+    /// than it: as many are run at once as fit, and as there are in a batch.
     ///
     /// # Errors
     /// When the device was lost.
@@ -61,7 +61,8 @@ impl Fused {
                 samples += ray.s.len();
                 samples <= self.samples && ray.rays_in_batch == first.rays_in_batch
             };
-            let count = rest.iter().take(RAYS).take_while(fits).count().max(1);
+            let most = RAYS.min(batch_of(first) as usize);
+            let count = rest.iter().take(most).take_while(fits).count().max(1);
             outputs.extend(self.run_once(&rest[..count])?);
             rest = &rest[count..];
         }
@@ -86,7 +87,7 @@ impl Fused {
             CompositeOutput {
                 rendered,
                 loss_terms,
-                loss: loss_terms.iter().sum::<f64>() / (4.0 * f64::from(ray.rays_in_batch)),
+                loss: loss_terms.iter().sum::<f64>() / (4.0 * f64::from(batch_of(ray))),
                 weights: weights[range].iter().map(|&w| f64::from(w)).collect(),
                 transmittance_end: f64::NAN,
                 d_color: gradients.iter().map(|d| [d[0], d[1], d[2]].map(f64::from)).collect(),
@@ -116,10 +117,15 @@ impl Fused {
         spans.resize(rays.len().next_multiple_of(GROUP), [0, 0]);
         bench.write("kept_spans", &spans);
         let (count, kept) = (rays.len() as u32, steps.len() as u32);
-        let rays_used = rays.first().map_or(0, |ray| ray.rays_in_batch.max(count));
+        let rays_used = rays.first().map_or(0, batch_of);
         bench.set_counters(Counters { rays: count, rays_used, kept, ..Counters::default() });
         spans
     }
+}
+
+/// `M`, as the reference takes it.
+fn batch_of(ray: &CompositeInput<'_>) -> u32 {
+    ray.rays_in_batch.max(1)
 }
 
 /// The error of every ray of a file.
