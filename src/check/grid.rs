@@ -5,7 +5,7 @@ use super::{Setup, Subject, Tally, Workbench};
 use crate::gpu::pass::Stage;
 use crate::kernels::density;
 use crate::model::FEATURES;
-use crate::reference::grid::{GridLevel, grid_encode};
+use crate::reference::grid::grid_encode;
 use crate::reference::model::{RaySample, TrainingRay};
 use anyhow::Result;
 use glam::DVec3;
@@ -32,7 +32,13 @@ pub fn features(subject: &Subject) -> Result<Tally> {
         for count in [0, 1, 3, 65, 130, 500] {
             let positions = positions(&mut random, count);
             let case = format!("{count} samples, finest {finest}");
-            compare(&mut tally, &case, &encode(&bench, &stages, &positions)?, &levels, &table, &positions);
+            let got = encode(&bench, &stages, &positions)?;
+            for (position, got) in positions.iter().zip(got.chunks_exact(levels.len() * FEATURES)) {
+                let want = grid_encode(&levels, &table, *position);
+                // Entries are up to 1; a weight is a difference of positions in cells.
+                let size = |i: usize| 1.0 + f64::from(levels[i / FEATURES].resolution);
+                tally.each(&format!("{case}, at {position}"), got, &want, size);
+            }
         }
     }
     Ok(tally)
@@ -46,23 +52,6 @@ pub fn encode(bench: &Workbench, stages: &[Stage], positions: &[DVec3]) -> Resul
     bench.upload(&[one_ray(positions)])?;
     bench.run_only(stages, "encode")?;
     bench.read("encoding", positions.len() * bench.plan.layout.encoding())
-}
-
-fn compare(
-    tally: &mut Tally,
-    case: &str,
-    got: &[f32],
-    levels: &[GridLevel],
-    table: &[f64],
-    positions: &[DVec3],
-) {
-    let width = levels.len() * FEATURES;
-    for (position, got) in positions.iter().zip(got.chunks_exact(width)) {
-        let want = grid_encode(levels, table, *position);
-        // Entries are up to 1; a weight is a difference of positions in cells.
-        let size = |i: usize| 1.0 + f64::from(levels[i / FEATURES].resolution);
-        tally.each(&format!("{case}, at {position}"), got, &want, size);
-    }
 }
 
 /// Positions inside, on the borders of cells and of the box, and far outside.

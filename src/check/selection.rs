@@ -116,7 +116,8 @@ impl Selecting {
             }
             packed += count;
             let raw = &raw[first..first + ray.samples.len()];
-            close += usize::from(!self.compare_ray(tally, number, ray, raw, &all[begin..packed], first));
+            let chosen = Chosen { number, ray, raw, first, kept: &all[begin..packed] };
+            close += usize::from(!chosen.compare(tally, self.reference(&chosen)));
             first += ray.samples.len();
         }
         tally.holds(packed == kept, || format!("{packed} of {kept} belong to rays"));
@@ -124,37 +125,8 @@ impl Selecting {
         Ok(kept)
     }
 
-    /// Compares the chosen samples of a ray whose first sample is `first`; false where rounding may decide.
-    fn compare_ray(
-        &self,
-        tally: &mut Tally,
-        number: usize,
-        ray: &TrainingRay,
-        raw: &[f32],
-        chosen: &[Kept],
-        first: usize,
-    ) -> bool {
-        let case = || format!("ray {number} of {} samples", ray.samples.len());
-        for kept in chosen {
-            let s =
-                raw.get((kept.sample as usize).wrapping_sub(first)).map(|s| s.min(MAX_LOG_DENSITY as f32));
-            tally.holds(kept.ray as usize == number && s == Some(kept.s), || format!("{}: {kept:?}", case()));
-        }
-        let Some(want) = self.reference(number, ray, raw) else { return false };
-        let samples = chosen.iter().map(|kept| kept.sample as usize);
-        let same = samples.eq(want.iter().map(|kept| first + kept.index));
-        tally.holds(same, || format!("{}: other samples than {want:?}", case()));
-        if same {
-            for (got, want) in chosen.iter().zip(&want) {
-                let delta = want.gain * ray.samples[want.index].delta;
-                tally.value(got.delta.into(), delta, delta, || format!("{}: step", case()));
-            }
-        }
-        true
-    }
-
-    /// What the reference keeps of ray `number`; `None` where rounding may decide.
-    fn reference(&self, number: usize, ray: &TrainingRay, raw: &[f32]) -> Option<Vec<selection::Kept>> {
+    /// What the reference keeps of a ray; `None` where rounding may decide.
+    fn reference(&self, &Chosen { number, ray, raw, .. }: &Chosen<'_>) -> Option<Vec<selection::Kept>> {
         let config = &self.bench.plan.config.selection;
         let selection = selection::Selection {
             stop_transmittance: config.stop_transmittance,
@@ -178,5 +150,40 @@ impl Selecting {
             }
         }
         Some(want)
+    }
+}
+
+/// A ray and the samples of it that the device chose.
+struct Chosen<'a> {
+    number: usize,
+    ray: &'a TrainingRay,
+    /// Raw log-densities of its samples.
+    raw: &'a [f32],
+    /// Its first sample.
+    first: usize,
+    kept: &'a [Kept],
+}
+
+impl Chosen<'_> {
+    /// Compares with what the reference keeps; false where that is not sure.
+    fn compare(&self, tally: &mut Tally, want: Option<Vec<selection::Kept>>) -> bool {
+        let Self { number, ray, raw, first, .. } = *self;
+        let case = || format!("ray {number} of {} samples", ray.samples.len());
+        for kept in self.kept {
+            let raw = raw.get((kept.sample as usize).wrapping_sub(first));
+            let s = raw.map(|raw| raw.min(MAX_LOG_DENSITY as f32));
+            tally.holds(kept.ray as usize == number && s == Some(kept.s), || format!("{}: {kept:?}", case()));
+        }
+        let Some(want) = want else { return false };
+        let samples = self.kept.iter().map(|kept| kept.sample as usize);
+        let same = samples.eq(want.iter().map(|kept| first + kept.index));
+        tally.holds(same, || format!("{}: other samples than {want:?}", case()));
+        if same {
+            for (got, want) in self.kept.iter().zip(&want) {
+                let delta = want.gain * ray.samples[want.index].delta;
+                tally.value(got.delta.into(), delta, delta, || format!("{}: step", case()));
+            }
+        }
+        true
     }
 }
