@@ -1,15 +1,17 @@
-// The mean over all cells that a camera sees. One workgroup.
+// The mean over all cells that a camera sees. One workgroup; four cells at a time, since a software driver may end
+// loops after 65535 rounds.
 
-var<storage, read> occupancy: array<f32>;
+var<storage, read> occupancy: array<vec4<f32>>;
 var<storage, read_write> occupancy_mean: array<f32>;
 var<workgroup> sums: array<vec2<f32>, 256>;
 
 @compute @workgroup_size(256)
 fn main(@builtin(local_invocation_index) thread: u32) {
     var sum = vec2(0.0);
-    for (var i = thread; i < CELL_COUNT; i += 256u) {
-        let value = occupancy[i];
-        sum += select(vec2(0.0), vec2(value, 1.0), value >= 0.0);
+    for (var i = thread; i < CELL_COUNT / 4u; i += 256u) {
+        let values = occupancy[i];
+        let seen = select(vec4(0.0), vec4(1.0), values >= vec4(0.0));
+        sum += vec2(dot(values, seen), dot(seen, vec4(1.0)));
     }
     sums[thread] = sum;
     workgroupBarrier();

@@ -87,6 +87,10 @@ pub struct Needs {
     pub cameras: usize,
 }
 
+/// llvmpipe ends the loops of a thread after so many rounds together, without an error; ordered sums have one round
+/// per kept sample.
+const LONGEST_LOOP: usize = 65_535;
+
 /// Everything that decides how kernels are linked.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -110,8 +114,10 @@ impl Plan {
     /// Chooses what depends on the adapter.
     #[must_use]
     pub fn new(gpu: &Gpu, config: Config, layout: Layout, needs: Needs) -> Self {
+        let orders = gpu.is_cpu() && config.batch.kept / 2 * 3 <= LONGEST_LOOP;
         let accumulation = match config.accumulation {
-            Accumulation::Auto if gpu.is_cpu() => Accumulation::Ordered,
+            Accumulation::Ordered if gpu.is_cpu() && !orders => Accumulation::Fixed,
+            Accumulation::Auto if orders => Accumulation::Ordered,
             Accumulation::Auto if config.deterministic => Accumulation::Fixed,
             Accumulation::Auto if gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC) => Accumulation::Float,
             Accumulation::Auto => Accumulation::Exchange,

@@ -343,3 +343,16 @@ fn steps_without_finite_gradients_are_skipped() {
     }
     assert!(skipped > 5 && skipped < 95 && steps == 100, "{skipped} of {steps} steps were skipped");
 }
+
+/// A software driver ends long loops without an error; ordered sums have a round per kept sample.
+#[test]
+fn batches_too_long_for_ordered_sums() {
+    for (kept, accumulation) in [(1 << 14, Accumulation::Ordered), (1 << 16, Accumulation::Fixed)] {
+        let mut config = Config { accumulation: Accumulation::Ordered, ..config() };
+        config.batch = Batch { kept, samples: 1 << 17, rays: 1 << 12, first_rays: 64 };
+        let training = Scene::default().train_with(config);
+        let expected = if training.gpu.is_cpu() { accumulation } else { Accumulation::Ordered };
+        assert_eq!(training.trainer.plan().accumulation, expected, "{kept}");
+        training.survives(4);
+    }
+}
