@@ -285,8 +285,12 @@ fn far_too_high_learning_rates() {
             ["train", text(&TOYS), "--out", text(&run), "--config", SMOKE, "--steps", "64", "--set", &rate];
         let output = nerf(&args).assert().get_output().clone();
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        let result = String::from_utf8_lossy(&output.stdout).into_owned();
         match output.status.code() {
-            Some(0) => drop(checkpoint(&run)),
+            Some(0) => {
+                checkpoint(&run);
+                assert!(rate == "optimizer.learning_rate=1" || result.contains("smaller"), "{result}");
+            }
             Some(1) => assert!(message.contains("learning_rate"), "{message}"),
             other => panic!("exit code {other:?}: {message}"),
         }

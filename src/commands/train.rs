@@ -97,20 +97,11 @@ fn finish(
         "run": folder,
         "steps": end.step,
         "seconds": end.seconds,
-        "loss": end.loss,
+        "loss": end.loss.map(|[_, last]| last),
         "skipped": end.skipped,
         "interrupted": end.interrupted,
     });
-    let mut text = format!("{} steps in {}, saved to {folder}", end.step, duration(end.seconds));
-    if end.skipped > 0 {
-        text += &format!(
-            "; {} steps were skipped, their gradients were not finite or far too large",
-            end.skipped
-        );
-    }
-    if end.interrupted {
-        text = format!("interrupted after {text}; go on with --resume");
-    }
+    let mut text = summary(end, setup, &folder);
     let views = evaluate(args, &mut course, end, setup, session)?;
     if let Ok(Some([psnr, ssim])) = views.as_ref().map(TestViews::means) {
         let views = views.as_ref().map_or(0, TestViews::count);
@@ -126,6 +117,29 @@ fn finish(
         Err(error) => session.remarks.warn(&format!("the training is saved, but {error:#}")),
     }
     session.print(&result, &text)
+}
+
+/// How the training went, in one line.
+fn summary(end: &End, setup: &Setup, folder: &str) -> String {
+    let mut text = format!("{} steps in {}, saved to {folder}", end.step, duration(end.seconds));
+    if end.skipped > 0 {
+        text += &format!(
+            "; {} steps were skipped, their gradients were not finite or far too large",
+            end.skipped
+        );
+    }
+    if let Some([first, last]) = end.loss.filter(|[first, last]| setup.about.step == 0 && *last > 0.5 * first)
+    {
+        text += &format!(
+            "; the loss has hardly fallen, from {first:.4} to {last:.4}: give it more steps, or a smaller \
+             optimizer.learning_rate than {}",
+            setup.about.config.optimizer.learning_rate
+        );
+    }
+    if end.interrupted {
+        text = format!("interrupted after {text}; go on with --resume");
+    }
+    text
 }
 
 /// The scores of all test views, logged, or why there are none.

@@ -35,7 +35,8 @@ pub(super) struct Course<'a> {
     start: (u32, f64),
     /// Step and seconds of the newest checkpoint; step 0 when there is none.
     saved: (u32, f64),
-    loss: Option<f64>,
+    /// The first and the last loss of this run.
+    loss: Option<[f64; 2]>,
     is_empty: bool,
 }
 
@@ -46,8 +47,8 @@ pub(super) struct End {
     pub(super) step: u32,
     /// Seconds of training, those of earlier runs included.
     pub(super) seconds: f64,
-    /// The last loss; `None` when no step was taken.
-    pub(super) loss: Option<f64>,
+    /// The first and the last loss of this run; `None` when no step was taken.
+    pub(super) loss: Option<[f64; 2]>,
     /// Steps of this run whose gradients could not be used.
     pub(super) skipped: u32,
     /// Whether it was asked to stop before its end.
@@ -105,7 +106,7 @@ impl<'a> Course<'a> {
     fn record(&mut self, block: &Block, progress: &Progress) -> Result<()> {
         let (step, seconds, stats) = (self.pace.steps(), self.pace.seconds(), &block.stats);
         let psnr = (-10.0 * stats.color_error.log10()).min(PSNR_CAP_DB);
-        self.loss = Some(stats.loss);
+        self.loss = Some([self.loss.map_or(stats.loss, |[first, _]| first), stats.loss]);
         if stats.samples == 0 && !self.is_empty {
             progress.say(&format!(
                 "warning: at step {step} the rays meet nothing any more, the field has become empty; try a smaller \
