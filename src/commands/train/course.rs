@@ -14,6 +14,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// Seconds of training between checkpoints.
 const BETWEEN_CHECKPOINTS: f64 = 60.0;
@@ -155,10 +156,16 @@ impl<'a> Course<'a> {
         if self.eval_every.is_none_or(|every| !step.is_multiple_of(every)) {
             return Ok(());
         }
+        let clock = Instant::now();
         let Some(Means { psnr, views, .. }) = exam.few()? else { return Ok(()) };
         progress.say(&format!("step {step}: PSNR {psnr:.2} dB over {views} test views"));
-        let row = json!({ "step": step, "seconds": self.pace.seconds(), "eval_psnr": psnr, "views": views });
-        self.log.write(&row)
+        self.log.write(&json!({
+            "step": step,
+            "seconds": self.pace.seconds(),
+            "eval_psnr": psnr,
+            "eval_seconds": clock.elapsed().as_secs_f64(),
+            "views": views,
+        }))
     }
 
     fn save(&mut self) -> Result<()> {
