@@ -1,5 +1,5 @@
-// The encoding's backward pass: adds each kept sample's gradient to the eight corners of its cells. One level
-// per row of workgroups. Needs: counters, grid, gradient, usable.
+// The encoding's backward pass: adds each kept sample's gradient to the eight corners of its cells.
+// Needs: counters, grid, corners, usable.
 
 var<storage, read> counters: Counters;
 tensor<read> samples: vec4<f32>;
@@ -21,14 +21,6 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         if gradient.x == 0.0 && gradient.y == 0.0 {
             continue;
         }
-        let cell = grid_cell(position, level);
-        gradient_add(cell.entries[0], cell.weights[0] * gradient);
-        gradient_add(cell.entries[1], cell.weights[1] * gradient);
-        gradient_add(cell.entries[2], cell.weights[2] * gradient);
-        gradient_add(cell.entries[3], cell.weights[3] * gradient);
-        gradient_add(cell.entries[4], cell.weights[4] * gradient);
-        gradient_add(cell.entries[5], cell.weights[5] * gradient);
-        gradient_add(cell.entries[6], cell.weights[6] * gradient);
-        gradient_add(cell.entries[7], cell.weights[7] * gradient);
+        gradient_scatter(position, level, gradient);
     }
 }

@@ -1,6 +1,6 @@
 // The encoding's backward pass without atomics: each thread owns one level and adds the kept samples' gradients
 // in their order, so that nothing collides and every sum is the same in every run. For adapters with few
-// threads, where it is three times as fast as atomics. Needs: counters, grid, usable.
+// threads, where it is three times as fast as atomics. Needs: counters, grid, corners, usable.
 
 var<storage, read> counters: Counters;
 tensor<read> samples: vec4<f32>;
@@ -9,7 +9,7 @@ tensor<read> kept_rows: vec2<u32>;
 tensor<read> d_encoding: vec4<f32>;
 tensor<read_write> d_table: vec2<f32>;
 
-fn d_table_add(entry: u32, gradient: vec2<f32>) {
+fn gradient_add(entry: u32, gradient: vec2<f32>) {
     d_table_store(entry, d_table_load(entry) + gradient);
 }
 
@@ -24,14 +24,6 @@ fn main(@builtin(local_invocation_id) lane: vec3<u32>, @builtin(workgroup_id) gr
         let both = d_encoding_load(index * (LEVELS / 2u) + l / 2u);
         let gradient = select(both.xy, both.zw, odd);
         let position = samples_load(kept_rows_load(index).x).xyz;
-        let cell = grid_cell(position, level);
-        d_table_add(cell.entries[0], cell.weights[0] * gradient);
-        d_table_add(cell.entries[1], cell.weights[1] * gradient);
-        d_table_add(cell.entries[2], cell.weights[2] * gradient);
-        d_table_add(cell.entries[3], cell.weights[3] * gradient);
-        d_table_add(cell.entries[4], cell.weights[4] * gradient);
-        d_table_add(cell.entries[5], cell.weights[5] * gradient);
-        d_table_add(cell.entries[6], cell.weights[6] * gradient);
-        d_table_add(cell.entries[7], cell.weights[7] * gradient);
+        gradient_scatter(position, level, gradient);
     }
 }

@@ -56,6 +56,22 @@ const ADAM: Part = part!("common/adam.wgsl");
 const COUNT_SAMPLES: Part = part!("layer/count_samples.wgsl");
 const COUNT_KEPT: Part = part!("layer/count_kept.wgsl");
 
+/// Dimensions of the random numbers, as the kernels draw them.
+pub mod dimension {
+    /// The view of a training ray.
+    pub const IMAGE: u32 = 0;
+    /// Its pixel.
+    pub const PIXEL: u32 = 1;
+    /// Where its first sample lies.
+    pub const OFFSET: u32 = 2;
+    /// Which of its samples are kept.
+    pub const SELECTION: u32 = 3;
+    /// Red, green and blue of its background, in this dimension and the next two.
+    pub const BACKGROUND: u32 = 4;
+    /// Position in a cell of the occupancy grid, in this dimension and the next two.
+    pub const CELL: u32 = 8;
+}
+
 /// Indices of the dispatch sizes that kernels write.
 pub mod dispatch {
     /// Over rays.
@@ -114,7 +130,7 @@ impl Plan {
     /// Chooses what depends on the adapter.
     #[must_use]
     pub fn new(gpu: &Gpu, config: Config, layout: Layout, needs: Needs) -> Self {
-        let orders = gpu.is_cpu() && config.batch.kept / 2 * 3 <= LONGEST_LOOP;
+        let orders = gpu.is_cpu() && marching::kept_capacity(&config.batch) <= LONGEST_LOOP;
         let accumulation = match config.accumulation {
             Accumulation::Ordered if gpu.is_cpu() && !orders => Accumulation::Fixed,
             Accumulation::Auto if orders => Accumulation::Ordered,
@@ -229,12 +245,12 @@ impl Plan {
             ("DISPATCH_SAMPLE_TILES", dispatch::SAMPLE_TILES),
             ("DISPATCH_KEPT", dispatch::KEPT),
             ("DISPATCH_KEPT_TILES", dispatch::KEPT_TILES),
-            ("RANDOM_IMAGE", 0),
-            ("RANDOM_PIXEL", 1),
-            ("RANDOM_OFFSET", 2),
-            ("RANDOM_SELECTION", 3),
-            ("RANDOM_BACKGROUND", 4),
-            ("RANDOM_CELL", 8),
+            ("RANDOM_IMAGE", dimension::IMAGE as usize),
+            ("RANDOM_PIXEL", dimension::PIXEL as usize),
+            ("RANDOM_OFFSET", dimension::OFFSET as usize),
+            ("RANDOM_SELECTION", dimension::SELECTION as usize),
+            ("RANDOM_BACKGROUND", dimension::BACKGROUND as usize),
+            ("RANDOM_CELL", dimension::CELL as usize),
         ];
         counts.iter().fold(source, |source, (name, value)| source.count(name, *value))
     }

@@ -212,14 +212,7 @@ impl Trainer {
         }
         self.step += 1;
         let optimizer = &self.plan.config.optimizer;
-        let correction = |beta: f64| (1.0 / (1.0 - beta.powf(f64::from(self.step)))) as f32;
-        let step = Step {
-            stream: self.stream(),
-            learning_rate: learning_rate as f32,
-            first_correction: correction(optimizer.beta_1),
-            second_correction: correction(optimizer.beta_2),
-            ..Step::default()
-        };
+        let step = Step { stream: self.stream(), ..Step::learning(optimizer, self.step, learning_rate) };
         self.gpu.write(self.workspace.get("step"), 0, &[step]);
         self.gpu.run("step", &self.stages, timer.as_deref_mut());
         if let Some(timer) = timer {

@@ -31,13 +31,7 @@ fn reference(bench: &Workbench, l2: f64, skip_zero: bool) -> Adam {
 /// Sets what Adam needs to know of step `step`.
 pub fn begin(bench: &Workbench, step: u32, learning_rate: f64) {
     let config = &bench.plan.config.optimizer;
-    let correction = |beta: f64| (1.0 / (1.0 - beta.powf(f64::from(step)))) as f32;
-    bench.set_step(Step {
-        learning_rate: learning_rate as f32,
-        first_correction: correction(config.beta_1),
-        second_correction: correction(config.beta_2),
-        ..quiet_step()
-    });
+    bench.set_step(Step { stream: quiet_step().stream, ..Step::learning(config, step, learning_rate) });
     bench.set_counters(Counters { rays: 3, rays_used: 3, ..Counters::default() });
 }
 

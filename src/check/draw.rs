@@ -5,22 +5,6 @@ use crate::reference::model::{RaySample, TrainingRay};
 use crate::reference::random;
 use glam::DVec3;
 
-/// Dimensions of the random numbers, as the kernels draw them.
-pub mod dimension {
-    /// The view of a training ray.
-    pub const IMAGE: u32 = 0;
-    /// Its pixel.
-    pub const PIXEL: u32 = 1;
-    /// Where its first sample lies.
-    pub const OFFSET: u32 = 2;
-    /// Which of its samples are kept.
-    pub const SELECTION: u32 = 3;
-    /// Red, green and blue of its background, in this dimension and the next two.
-    pub const BACKGROUND: u32 = 4;
-    /// Position in a cell of the occupancy grid, in this dimension and the next two.
-    pub const CELL: u32 = 8;
-}
-
 /// Seed of the kernels' random numbers in every check.
 pub const SEED: u32 = 5;
 /// Step of the kernels' random numbers in every check.

@@ -1,10 +1,10 @@
 //! From rays to samples, through the occupancy grid.
 
-use super::draw::{Random, dimension, uniform};
+use super::draw::{Random, uniform};
 use super::rays::{drawn, pixel_camera};
 use super::{Setup, Subject, Tally, Workbench};
 use crate::gpu::pass::Stage;
-use crate::kernels::{marching, training};
+use crate::kernels::{dimension, marching, training};
 use crate::reference::march::{BoxRay, March, MarchSample, box_interval};
 use crate::reference::occupancy::{OccupancyShape, is_set};
 use anyhow::Result;

@@ -1,8 +1,8 @@
 //! The occupancy grid's update.
 
-use super::draw::{Random, dimension, quiet_step, uniform};
+use super::draw::{Random, quiet_step, uniform};
 use super::{Setup, Subject, Tally, Workbench, visible_cells};
-use crate::kernels::{Step, occupancy};
+use crate::kernels::{Step, dimension, occupancy};
 use crate::reference::grid::grid_encode;
 use crate::reference::model::Model;
 use crate::reference::occupancy::{OccupancyShape, UNSEEN, bits, is_set, threshold, visit};

@@ -1,12 +1,12 @@
 //! Rays through pixels: those of a view through every lens, and those of a training with their targets.
 
-use super::draw::{Random, SEED, STEP, dimension, quiet_step, uniform};
+use super::draw::{Random, SEED, STEP, quiet_step, uniform};
 use super::{Setup, Subject, Tally, Workbench};
 use crate::camera::{Camera, Lens};
 use crate::config::Background;
 use crate::dataset::Bounds;
 use crate::gpu::pass::Stage;
-use crate::kernels::{self, Step, training, viewing};
+use crate::kernels::{self, Step, dimension, training, viewing};
 use crate::reference::lens::Distortion;
 use crate::reference::march::{BoxRay, box_interval};
 use crate::reference::random::random_u32;

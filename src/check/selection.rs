@@ -1,9 +1,9 @@
 //! Which samples get colour: select, scan and pack.
 
-use super::draw::{Random, dimension, random_batch, uniform};
+use super::draw::{Random, random_batch, uniform};
 use super::{Kept, Setup, Subject, Tally, Workbench};
 use crate::gpu::pass::Stage;
-use crate::kernels::color;
+use crate::kernels::{color, dimension};
 use crate::reference::activation::{MAX_LOG_DENSITY, log_density};
 use crate::reference::model::TrainingRay;
 use crate::reference::selection::{self, select};

@@ -26,7 +26,7 @@ pub enum Selection {
 /// # Errors
 /// When the adapter cannot hold them.
 pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
-    let rows = kept_capacity(plan) + SPARE_ROWS;
+    let rows = kept_capacity(&plan.config.batch) + SPARE_ROWS;
     let width = plan.config.network.width;
     let tensors = [
         ("chosen", Element::Pair, plan.config.batch.samples),

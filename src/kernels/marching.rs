@@ -3,6 +3,7 @@
 use super::{
     COUNTERS, Counters, MARCH_START, OCCUPANCY, Plan, RANDOM, RAY, RAY_LOAD, STEP, Step, Workspace, dispatch,
 };
+use crate::config::Batch;
 use crate::gpu::Gpu;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
@@ -84,7 +85,7 @@ pub fn scan(gpu: &Gpu, plan: &Plan, workspace: &Workspace, scanned: Scanned) -> 
     let batch = &plan.config.batch;
     let (label, part, capacity, spans) = match scanned {
         Scanned::Samples => ("scan samples", part!("common/scan_samples.wgsl"), batch.samples, "ray_spans"),
-        Scanned::Kept => ("scan kept", part!("common/scan_kept.wgsl"), kept_capacity(plan), "kept_spans"),
+        Scanned::Kept => ("scan kept", part!("common/scan_kept.wgsl"), kept_capacity(batch), "kept_spans"),
     };
     let parts = [COUNTERS, part, part!("scan.wgsl")];
     let kernel = plan.generated_kernel(gpu, label, &parts, &[("CAPACITY", capacity)], String::new())?;
@@ -94,6 +95,6 @@ pub fn scan(gpu: &Gpu, plan: &Plan, workspace: &Workspace, scanned: Scanned) -> 
 /// Most kept samples of a step: half as much again as the target, since the number of rays follows it only
 /// from step to step.
 #[must_use]
-pub fn kept_capacity(plan: &Plan) -> usize {
-    (plan.config.batch.kept / 2 * 3).min(plan.config.batch.samples)
+pub fn kept_capacity(batch: &Batch) -> usize {
+    (batch.kept / 2 * 3).min(batch.samples)
 }

@@ -1,6 +1,7 @@
 //! The structs that kernels and the host share.
 
 use crate::camera::Lens;
+use crate::config::Optimizer;
 use crate::dataset::Bounds;
 use crate::gpu_struct;
 
@@ -23,6 +24,20 @@ gpu_struct! {
         first_correction: f32,
         /// 1 / (1 - beta_2^t).
         second_correction: f32,
+    }
+}
+
+impl Step {
+    /// What Adam needs to know of its step `step`, counted from 1.
+    #[must_use]
+    pub fn learning(optimizer: &Optimizer, step: u32, learning_rate: f64) -> Self {
+        let correction = |beta: f64| (1.0 / (1.0 - beta.powf(f64::from(step)))) as f32;
+        Self {
+            learning_rate: learning_rate as f32,
+            first_correction: correction(optimizer.beta_1),
+            second_correction: correction(optimizer.beta_2),
+            ..Self::default()
+        }
     }
 }
 

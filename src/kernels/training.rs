@@ -40,7 +40,7 @@ const D_COLOR_HIDDEN: [&str; 4] =
 /// When the adapter cannot hold them.
 pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
     let (batch, layout) = (&plan.config.batch, &plan.layout);
-    let rows = kept_capacity(plan) + SPARE_ROWS;
+    let rows = kept_capacity(&plan.config.batch) + SPARE_ROWS;
     let width = plan.config.network.width;
     for name in ["targets", "backgrounds", "rendered", "ray_errors"] {
         workspace.add(gpu.storage::<[f32; 4]>(name, batch.rays)?);
@@ -207,7 +207,7 @@ fn weight_kernel(gpu: &Gpu, plan: &Plan, outputs: usize) -> Result<Kernel> {
 pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
     const MAGNITUDE: Part = part!("common/magnitude.wgsl");
     let [add, take] = plan.gradient();
-    let mut scattering = [&[COUNTERS, GRID, USABLE], add.as_slice()].concat();
+    let mut scattering = [&[COUNTERS, GRID, USABLE, part!("common/corners.wgsl")], add.as_slice()].concat();
     if plan.accumulation != Accumulation::Ordered {
         scattering.push(part!("scatter.wgsl"));
     }

@@ -16,7 +16,7 @@ fn too_many_kept_samples() -> Result<()> {
     setup.config.batch.kept = 60;
     let selecting = Selecting::new(&subject()?, setup)?;
     let bench = &selecting.bench;
-    let capacity = kept_capacity(&bench.plan);
+    let capacity = kept_capacity(&bench.plan.config.batch);
     let mut random = Random::new(32);
     for (rays, samples) in [(33, 130), (2, 130), (130, capacity), (150, 260)] {
         let batch = random_batch(&mut random, rays, samples);
