@@ -1,10 +1,9 @@
 //! `nerf eval`: PSNR and SSIM against photos.
 
 use super::field::Field;
-use super::scores::{Judge, Means, Score};
+use super::scores::{Compared, Judge, Means, Score};
 use super::{Session, find_frames, writable_folder};
 use crate::cli::Eval;
-use crate::progress::Progress;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::Lens;
 use nerf::dataset::{Dataset, OpenOptions, Split};
@@ -45,19 +44,17 @@ fn measure(
     args: &Eval,
     session: &Session<'_>,
 ) -> Result<Vec<Score>> {
-    let progress = Progress::new(session.remarks, "measuring");
     let mut scores = Vec::with_capacity(indices.len());
-    for (number, &index) in indices.iter().enumerate() {
-        let (mut score, rendered) = judge.load_and_score(index)?;
+    judge.each(indices, session.remarks, |compared| {
+        let Compared { mut score, size: [width, height], rendered, .. } = compared;
         if let Some(folder) = &args.save {
-            let camera = &judge.dataset.frames[index].camera;
-            let file = format!("{number:04}.png");
-            write_png_rgba8(&folder.join(&file), camera.width, camera.height, &opaque_srgb8(&rendered))?;
+            let file = format!("{:04}.png", scores.len());
+            write_png_rgba8(&folder.join(&file), width, height, &opaque_srgb8(&rendered))?;
             score.saved = Some(file);
         }
         scores.push(score);
-        progress.count(number + 1, indices.len(), "views");
-    }
+        Ok(())
+    })?;
     Ok(scores)
 }
 

@@ -2,7 +2,6 @@
 
 use super::scores::{Judge, Means, Score};
 use super::train::setup::Setup;
-use crate::progress::Progress;
 use crate::remarks::Remarks;
 use anyhow::Result;
 use nerf::dataset::Dataset;
@@ -60,19 +59,18 @@ impl<'a> Exam<'a> {
     pub(super) fn few(&mut self) -> Result<Option<Means>> {
         let mut scores = Vec::with_capacity(self.few.len());
         for (index, image) in &self.few {
-            scores.push(self.judge.score(*index, image)?.0);
+            scores.push(self.judge.compare(*index, image)?.score);
         }
         Ok(Means::of(&scores))
     }
 
     /// Measures all.
     pub(super) fn all(&mut self, remarks: Remarks) -> Result<Option<Marks>> {
-        let progress = Progress::new(remarks, "measuring");
         let mut scores = Vec::with_capacity(self.test.len());
-        for (number, &index) in self.test.iter().enumerate() {
-            scores.push(self.judge.load_and_score(index)?.0);
-            progress.count(number + 1, self.test.len(), "test views");
-        }
+        self.judge.each(&self.test, remarks, |compared| {
+            scores.push(compared.score);
+            Ok(())
+        })?;
         let is_one_of_few = |index: &usize| self.few.iter().any(|(few, _)| few == index);
         let few: Vec<Score> = (self.test.iter().zip(&scores))
             .filter(|(index, _)| is_one_of_few(index))

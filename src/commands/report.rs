@@ -4,7 +4,6 @@ use super::field::Field;
 use super::scores::Judge;
 use super::{Session, find_frames};
 use crate::cli::Report as Args;
-use crate::progress::Progress;
 use crate::remarks::Remarks;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::Lens;
@@ -79,15 +78,12 @@ pub(super) fn after_training(run: &Path, about: &About, views: Result<TestViews,
 
 /// Renders and scores frames, and keeps pictures of a few.
 pub(super) fn measure(judge: &mut Judge<'_>, indices: &[usize], remarks: Remarks) -> Result<TestViews> {
-    let progress = Progress::new(remarks, "measuring");
     let mut views = TestViews::new(indices.len());
-    for (number, &index) in indices.iter().enumerate() {
-        let compared = judge.load_and_compare(index)?;
+    judge.each(indices, remarks, |compared| {
         let (score, size) = (&compared.score, compared.size);
         let pair = Pair { size, rendered: &compared.rendered, photo: &compared.photo };
-        views.add(&score.file, [score.psnr, score.ssim], || Pictures::new(&pair))?;
-        progress.count(number + 1, indices.len(), "test views");
-    }
+        views.add(&score.file, [score.psnr, score.ssim], || Pictures::new(&pair))
+    })?;
     Ok(views)
 }
 

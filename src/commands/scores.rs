@@ -1,5 +1,7 @@
 //! Measuring rendered views against photos.
 
+use crate::progress::Progress;
+use crate::remarks::Remarks;
 use anyhow::Result;
 use nerf::dataset::Dataset;
 use nerf::image::Image;
@@ -70,7 +72,7 @@ pub(super) struct Compared {
 
 impl Judge<'_> {
     /// Renders frame `index`, whose photo is `image`, and compares.
-    fn compare(&mut self, index: usize, image: &Image) -> Result<Compared> {
+    pub(super) fn compare(&mut self, index: usize, image: &Image) -> Result<Compared> {
         let frame = &self.dataset.frames[index];
         let view = self.renderer.render(&frame.camera)?;
         let rendered = self.color_space.over(&view.color, self.background);
@@ -85,21 +87,19 @@ impl Judge<'_> {
         Ok(Compared { score, size: [view.width, view.height], rendered, photo })
     }
 
-    /// The score of frame `index`, whose photo is `image`, and the rendering, display-referred.
-    pub(super) fn score(&mut self, index: usize, image: &Image) -> Result<(Score, Vec<[f32; 3]>)> {
-        let compared = self.compare(index, image)?;
-        Ok((compared.score, compared.rendered))
-    }
-
-    /// Renders frame `index`, whose photo is decoded for it, and compares.
-    pub(super) fn load_and_compare(&mut self, index: usize) -> Result<Compared> {
-        let images = self.dataset.load_images(&[index], &|_| {})?;
-        self.compare(index, &images[0])
-    }
-
-    /// The score of frame `index`, whose photo is decoded for it, and the rendering.
-    pub(super) fn load_and_score(&mut self, index: usize) -> Result<(Score, Vec<[f32; 3]>)> {
-        let compared = self.load_and_compare(index)?;
-        Ok((compared.score, compared.rendered))
+    /// Renders frames one after the other, whose photos are decoded for it, and hands over what it compared.
+    pub(super) fn each(
+        &mut self,
+        indices: &[usize],
+        remarks: Remarks,
+        mut take: impl FnMut(Compared) -> Result<()>,
+    ) -> Result<()> {
+        let progress = Progress::new(remarks, "measuring");
+        for (number, &index) in indices.iter().enumerate() {
+            let images = self.dataset.load_images(&[index], &|_| {})?;
+            take(self.compare(index, &images[0])?)?;
+            progress.count(number + 1, indices.len(), "views");
+        }
+        Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! `log.jsonl` as it was left: every field may be missing, the last line may be torn.
 
 use anyhow::{Context, Result};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -94,7 +94,7 @@ pub struct Stages {
 }
 
 /// One stage.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Stage {
     /// Its name.

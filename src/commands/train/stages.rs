@@ -2,19 +2,10 @@
 
 use nerf::gpu::Gpu;
 use nerf::gpu::timer::Timer;
-use serde::Serialize;
+use nerf::report::log::Stage;
 
 /// Of so many blocks, one is timed: its steps wait for the device each, which costs a little.
 const BLOCKS_PER_TIMED: u32 = 16;
-
-/// The time of a stage.
-#[derive(Clone, Debug, Serialize)]
-pub(in crate::commands) struct StageTime {
-    /// Its name.
-    stage: String,
-    /// Milliseconds per step.
-    ms: f64,
-}
 
 /// Times the stages of some steps.
 #[derive(Debug)]
@@ -48,13 +39,12 @@ impl StageTimes {
     }
 
     /// Each stage's time, the longest first; none when nothing was timed.
-    pub(in crate::commands) fn per_step(&self) -> Vec<StageTime> {
+    pub(in crate::commands) fn per_step(&self) -> Vec<Stage> {
         let timer = self.timer.as_ref().filter(|_| self.steps > 0);
         let per_step = 1e3 / f64::from(self.steps.max(1));
         let mut stages: Vec<_> = timer.iter().flat_map(|timer| timer.totals()).collect();
         stages.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-        let time =
-            |(stage, seconds): (&String, &f64)| StageTime { stage: stage.clone(), ms: seconds * per_step };
+        let time = |(stage, seconds): (&String, &f64)| Stage { stage: stage.clone(), ms: seconds * per_step };
         stages.into_iter().map(time).collect()
     }
 }

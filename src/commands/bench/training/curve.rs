@@ -3,10 +3,10 @@
 use crate::commands::exam::Exam;
 use crate::commands::scores::Means;
 use crate::commands::train::pace::Pace;
-use crate::commands::train::stages::StageTime;
 use crate::progress::{Progress, duration};
 use crate::remarks::Remarks;
 use anyhow::{Context, Result};
+use nerf::report::log::Stage;
 use nerf::schedule::Budget;
 use serde::Serialize;
 
@@ -34,7 +34,7 @@ pub(super) struct Curve {
     /// device each, which costs a little.
     pub(super) timed_steps: u32,
     /// The time of each stage in those steps; none where the adapter has no timestamps.
-    pub(super) stages: Vec<StageTime>,
+    pub(super) stages: Vec<Stage>,
     /// In the order of time.
     pub(super) points: Vec<Point>,
 }
