@@ -1,6 +1,6 @@
 // The fused kernel: renders a ray, takes its loss, and walks back once for the gradients of colours and
 // log-densities. Section 2 of the design; the same formulas as `reference::composite`.
-// Needs: counters, exp, sum, transmittance, weights.
+// Needs: counters, exp, sum, transmittance, loss, depth_loss, weights.
 
 var<storage, read> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
@@ -11,7 +11,7 @@ var<storage, read> targets: array<vec4<f32>>;
 var<storage, read> backgrounds: array<vec4<f32>>;
 // Colour over the background, and opacity.
 var<storage, read_write> rendered: array<vec4<f32>>;
-// Squared errors of the four channels.
+// Squared errors of the four channels with their weights; opacity's also holds what the depth adds.
 var<storage, read_write> ray_errors: array<vec4<f32>>;
 // dL/dc in rgb and dL/ds in w. Between the walks it holds tau and the root of T of each sample.
 tensor<read_write> d_color: vec4<f32>;
@@ -29,6 +29,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let zero = span.x >> 31u;
     var depth = sum_of(vec4(0.0));
     var sum = sum_of(vec4(0.0));
+    var distance = depth_begin(index);
     for (var i = span.x; i < end; i++) {
         let step = kept_steps_load(i);
         let tau = optical_depth(step.x, step.y);
@@ -37,15 +38,18 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let own = vec4(color_load(i).rgb, 1.0);
         weight_store(i, root * (root * alpha));
         sum = sum_add(sum, squared_times(root, alpha * own), zero);
+        distance = depth_forward(distance, i, root, alpha, zero);
         d_color_store(i, vec4(tau, root, 0.0, 0.0));
         depth = sum_add(depth, vec4(tau), zero);
     }
     let result = sum.value + squared_times(exp_accurate(-0.5 * depth.value.x), background);
     let error = result - targets[index];
+    let weight = loss_weight(result);
     rendered[index] = result;
-    ray_errors[index] = error * error;
+    ray_errors[index] = weight * error * error + vec4(0.0, 0.0, 0.0, depth_squared_error(distance));
 
-    let d_result = error / (2.0 * f32(counters.rays_used));
+    let d_result = weight * error / (2.0 * f32(counters.rays_used));
+    distance = depth_turn(distance);
     var behind = sum_of(background);
     for (var i = end; i > span.x; i--) {
         let known = d_color_load(i - 1u);
@@ -53,17 +57,23 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let alpha = opacity(tau);
         let passing_root = exp_accurate(-0.5 * tau);
         let color = vec4(color_load(i - 1u).rgb, 1.0);
-        let d_s = tau * dot(d_result, gradient_color(alpha, color, behind));
+        let by_color = dot(d_result, gradient_color(alpha, color, behind));
+        let d_s = tau * (by_color + depth_gradient(distance, i - 1u, alpha));
         let d_c = squared_times(known.y, alpha * d_result).rgb;
         let root = gradient_root(known.y, passing_root);
         d_color_store(i - 1u, vec4(d_c, root * (root * d_s)));
-        let own = own_color(passing_root, color);
-        // e^-tau rounds, and would wear out the B of many thin samples.
-        let difference = sum_below(own, behind);
-        if tau < 0.35 {
-            behind = sum_add(behind, alpha * difference, zero);
-        } else {
-            behind = sum_add(sum_of(own), -squared_times(passing_root, difference), zero);
-        }
+        distance = depth_backward(distance, i - 1u, tau, alpha, passing_root, zero);
+        behind = behind_next(behind, color, tau, alpha, passing_root, zero);
     }
+}
+
+// What is seen from in front of a sample, from its colour and what is seen from just behind it.
+fn behind_next(behind: Sum, color: vec4<f32>, tau: f32, alpha: f32, passing_root: f32, zero: u32) -> Sum {
+    let own = own_color(passing_root, color);
+    // e^-tau rounds, and would wear out the B of many thin samples.
+    let difference = sum_below(own, behind);
+    if tau < 0.35 {
+        return sum_add(behind, alpha * difference, zero);
+    }
+    return sum_add(sum_of(own), -squared_times(passing_root, difference), zero);
 }

@@ -16,6 +16,7 @@ pub mod grid;
 pub mod hard_rays;
 pub mod harmonics;
 pub mod lens;
+pub mod loss;
 pub mod marching;
 pub mod networks;
 pub mod occupancy;
@@ -28,6 +29,7 @@ mod setup;
 pub mod step;
 mod subject;
 mod tally;
+pub mod targets;
 pub mod view;
 mod workbench;
 
@@ -45,12 +47,12 @@ struct Check {
 }
 
 /// In the order of a training step.
-const CHECKS: [Check; 15] = [
+const CHECKS: [Check; 16] = [
     Check { name: "exponentials", run: |subject| Ok(vec![exponential::exponentials(subject)?]) },
     Check { name: "random numbers", run: |subject| Ok(vec![random::random_numbers(subject)?]) },
     Check { name: "lenses", run: |subject| Ok(vec![lens::lens_model(subject)?]) },
     Check { name: "rays of views", run: rays::view_rays },
-    Check { name: "rays of a training", run: |subject| Ok(vec![rays::training_rays(subject)?]) },
+    Check { name: "rays of a training", run: |subject| Ok(vec![targets::training_rays(subject)?]) },
     Check { name: "marching", run: marching::marched_samples },
     Check { name: "hash grid", run: |subject| Ok(vec![grid::features(subject)?]) },
     Check { name: "selection", run: |subject| Ok(vec![selection::selected_samples(subject)?]) },
@@ -58,6 +60,10 @@ const CHECKS: [Check; 15] = [
     Check { name: "activations", run: |subject| Ok(vec![activation::activations(subject)?]) },
     Check { name: "networks and scatter", run: |subject| networks::networks(subject, &networks::SHAPES) },
     Check { name: "render, loss and gradient", run: fused::fused },
+    Check {
+        name: "depth and relative errors",
+        run: |subject| Ok(vec![loss::depth_and_relative_errors(subject)?]),
+    },
     Check { name: "Adam", run: adam::adam },
     Check { name: "occupancy", run: |subject| Ok(vec![occupancy::occupancy_update(subject)?]) },
     Check { name: "whole steps and views", run: whole },

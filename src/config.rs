@@ -21,6 +21,8 @@ pub struct Config {
     pub batch: Batch,
     /// Which samples get colour and gradients.
     pub selection: Selection,
+    /// What is minimised.
+    pub loss: Loss,
     /// Adam and the learning-rate schedule.
     pub optimizer: Optimizer,
     /// What lies behind the scene while training.
@@ -117,6 +119,30 @@ pub struct Selection {
     pub keep_probability: f64,
     /// A ray ends where its transmittance falls below this.
     pub stop_transmittance: f64,
+}
+
+/// What is minimised, beside the squared error of the opacity.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Loss {
+    /// How errors of the colour count.
+    pub color: ColorLoss,
+    /// Weight of the squared error of the depth, in sides of the inner cube, where photos have depth; 0 leaves depth
+    /// out.
+    pub depth: f64,
+}
+
+/// How errors of the colour count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ColorLoss {
+    /// Relative for HDR images, else squared.
+    #[default]
+    Auto,
+    /// The squared error.
+    Squared,
+    /// The squared error over the square of the rendered colour.
+    Relative,
 }
 
 /// Adam and the learning-rate schedule: a cosine over the budget of time or steps.
@@ -293,7 +319,7 @@ impl Config {
     /// # Errors
     /// Names the first key out of range, what is allowed and what was found.
     pub fn validate(&self) -> Result<()> {
-        let Self { grid, network, march, occupancy, batch, selection, optimizer, .. } = self;
+        let Self { grid, network, march, occupancy, batch, selection, loss, optimizer, .. } = self;
         if self.deterministic && matches!(self.accumulation, Accumulation::Float | Accumulation::Exchange) {
             bail!(
                 "a deterministic training must not add floats in any order: accumulation must be auto, ordered or \
@@ -335,6 +361,7 @@ impl Config {
         real("selection.weight_floor", selection.weight_floor, 1e-12, 1.0)?;
         real("selection.keep_probability", selection.keep_probability, 0.0, 1.0)?;
         real("selection.stop_transmittance", selection.stop_transmittance, 0.0, 0.5)?;
+        real("loss.depth", loss.depth, 0.0, 1e6)?;
         real("optimizer.learning_rate", optimizer.learning_rate, 0.0, 1e3)?;
         real("optimizer.final_learning_rate", optimizer.final_learning_rate, 0.0, 1e3)?;
         real("optimizer.beta_1", optimizer.beta_1, 0.0, 0.999_999)?;

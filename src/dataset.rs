@@ -10,6 +10,7 @@ mod intrinsics;
 mod json;
 mod notes;
 mod open;
+mod photo;
 mod pose;
 mod splits;
 pub mod transforms;
@@ -26,6 +27,7 @@ pub use bounds::Bounds;
 pub use intrinsics::Intrinsics;
 pub use notes::{Note, Severity};
 pub use open::read_cameras;
+pub use photo::Photo;
 pub use splits::HoldOut;
 
 /// A dataset: what is listed, what was found, and what was assumed.

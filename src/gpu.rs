@@ -3,6 +3,7 @@
 //! Nothing here knows what a radiance field is.
 
 pub mod adapter;
+pub mod banks;
 pub mod buffer;
 pub mod kernel;
 pub mod pass;

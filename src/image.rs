@@ -31,6 +31,8 @@ pub struct Image {
 pub enum Pixels {
     /// sRGB-encoded colour with straight alpha.
     Srgb8(Vec<[u8; 4]>),
+    /// The same with 16 bits.
+    Srgb16(Vec<[u16; 4]>),
     /// Scene-linear colour, premultiplied with alpha. Always finite, alpha in `[0, 1]`.
     Linear(Vec<[f32; 4]>),
 }
@@ -67,6 +69,7 @@ impl Image {
     pub fn is_cutout(&self) -> bool {
         match &self.pixels {
             Pixels::Srgb8(pixels) => pixels.iter().any(|pixel| pixel[3] < 255),
+            Pixels::Srgb16(pixels) => pixels.iter().any(|pixel| pixel[3] < 65_535),
             Pixels::Linear(pixels) => pixels.iter().any(|pixel| pixel[3] < 0.999),
         }
     }

@@ -16,6 +16,7 @@ pub mod density;
 pub mod layer;
 pub mod marching;
 pub mod occupancy;
+pub mod photos;
 mod shared;
 pub mod training;
 pub mod viewing;
@@ -24,7 +25,7 @@ mod workspace;
 pub use shared::{Camera, Counters, Step};
 pub use workspace::Workspace;
 
-use crate::config::{Accumulation, Background, Config, Transmittance};
+use crate::config::{Accumulation, Background, ColorLoss, Config, Transmittance};
 use crate::gpu::Gpu;
 use crate::gpu::kernel::{Kernel, Shared};
 use crate::gpu::source::Source;
@@ -97,11 +98,39 @@ pub struct Needs {
     pub alpha: bool,
     /// Pixels are linear floats.
     pub hdr: bool,
+    /// Some image has 16 bits.
+    pub deep: bool,
+    /// Some pixels are ignored.
+    pub masks: bool,
+    /// Depth is trained on.
+    pub depth: bool,
+    /// Scene-linear brightness that is 1 in the field: that of a typical pixel; 1 for images of 8 or 16 bits.
+    pub grey: f32,
     /// Cascades of the occupancy grid; 1 for a bounded scene.
     pub cascades: u32,
     /// Training cameras.
     pub cameras: usize,
 }
+
+impl Default for Needs {
+    /// One opaque 8-bit photo of a pinhole camera, of a bounded scene.
+    fn default() -> Self {
+        Self {
+            lens: false,
+            alpha: false,
+            hdr: false,
+            deep: false,
+            masks: false,
+            depth: false,
+            grey: 1.0,
+            cascades: 1,
+            cameras: 1,
+        }
+    }
+}
+
+/// Added to the square of a colour that an error is relative to (tiny-cuda-nn's RelativeL2).
+pub const RELATIVE_FLOOR: f64 = 0.01;
 
 /// llvmpipe ends the loops of a thread after so many rounds together, without an error; ordered sums have one round
 /// per kept sample.
@@ -223,6 +252,9 @@ impl Plan {
     fn dimensions(&self, source: Source) -> Source {
         let Self { config, layout, needs, .. } = self;
         let counts = [
+            ("RECORD_WORDS", self.record().words()),
+            ("POSITION_WORD", self.record().position()),
+            ("DEPTH_WORD", self.record().depth()),
             ("LEVELS", layout.levels.len()),
             ("TABLE_ENTRIES", layout.entries),
             ("DENSITY_OUTPUTS", DENSITY_OUTPUTS),
@@ -272,9 +304,12 @@ impl Plan {
             ("BETA_2", config.optimizer.beta_2),
             ("EPSILON", config.optimizer.epsilon),
             ("L2", config.optimizer.l2),
+            ("RELATIVE_FLOOR", RELATIVE_FLOOR),
+            ("DEPTH_WEIGHT", config.loss.depth),
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
-        source.constant("BACKGROUND", vec3(config.background.solid()))
+        let background = config.background.solid().map(|value| value / self.needs.grey);
+        source.constant("BACKGROUND", vec3(background))
     }
 
     fn lens(&self) -> Part {
@@ -283,14 +318,6 @@ impl Plan {
 
     fn stepping(&self) -> Part {
         if self.needs.cascades > 1 { part!("stepping/cone.wgsl") } else { part!("stepping/uniform.wgsl") }
-    }
-
-    fn pixels(&self) -> Part {
-        match (self.needs.hdr, self.needs.alpha) {
-            (true, _) => part!("pixels/linear.wgsl"),
-            (false, true) => part!("pixels/srgb8.wgsl"),
-            (false, false) => part!("pixels/srgb8_opaque.wgsl"),
-        }
     }
 
     pub(crate) fn activation(&self) -> Part {
@@ -302,6 +329,27 @@ impl Plan {
             Background::Random => part!("background/random.wgsl"),
             _ => part!("background/solid.wgsl"),
         }
+    }
+
+    /// Whether colour errors count relative to the colour.
+    #[must_use]
+    pub fn has_relative_loss(&self) -> bool {
+        match self.config.loss.color {
+            ColorLoss::Auto => self.needs.hdr,
+            chosen => chosen == ColorLoss::Relative,
+        }
+    }
+
+    fn loss(&self) -> Part {
+        if self.has_relative_loss() { part!("loss/relative.wgsl") } else { part!("loss/squared.wgsl") }
+    }
+
+    fn depth_loss(&self) -> Part {
+        if self.needs.depth { part!("depth_loss/squared.wgsl") } else { part!("depth_loss/none.wgsl") }
+    }
+
+    fn depth_target(&self) -> Part {
+        if self.needs.depth { part!("depth_target/stored.wgsl") } else { part!("depth_target/none.wgsl") }
     }
 
     fn transmittance(&self) -> Part {

@@ -28,7 +28,7 @@
 //! # A training in code
 //!
 //! ```no_run
-//! use nerf::{config::Config, dataset::Dataset, gpu, kernels::{Needs, Plan}, model, train};
+//! use nerf::{config::Config, dataset::Dataset, gpu, kernels::{Needs, Plan}, model, train, views::Views};
 //! use std::{path::Path, sync::Arc};
 //!
 //! # fn main() -> anyhow::Result<()> {
@@ -40,15 +40,18 @@
 //! let finest = model::finest_resolution(config.grid.base, &dataset.bounds, &cameras);
 //! let layout = model::Layout::new(&config, finest);
 //! let needs = Needs {
-//!     lens: false,
 //!     alpha: images.iter().any(|image| image.has_alpha),
 //!     hdr: dataset.is_hdr,
 //!     cascades: dataset.bounds.cascades,
 //!     cameras: cameras.len(),
+//!     ..Needs::default()
 //! };
 //! let plan = Plan::new(&gpu, config, layout, needs);
-//! let views = train::Views { cameras: &cameras, images: &images, bounds: &dataset.bounds };
-//! let mut trainer = train::Trainer::new(&gpu, plan, &views)?;
+//! let mut views = Views::new(&gpu, &plan, &cameras, &dataset.bounds)?;
+//! for image in images {
+//!     views.add(&image.into())?;
+//! }
+//! let mut trainer = train::Trainer::new(&gpu, plan, views)?;
 //! for _ in 0..1000 {
 //!     trainer.step(1e-2, None)?;
 //! }
@@ -78,5 +81,6 @@ pub mod report;
 pub mod scene;
 pub mod schedule;
 pub mod train;
+pub mod views;
 pub mod visibility;
 pub mod words;

@@ -79,17 +79,20 @@ impl ColorSpace {
 #[must_use]
 pub fn photo_over(image: &Image, background: [f32; 3]) -> Vec<[f32; 3]> {
     match &image.pixels {
-        Pixels::Srgb8(pixels) => {
-            let premultiplied = |&[r, g, b, a]: &[u8; 4]| {
-                let alpha = f32::from(a) / 255.0;
-                let [r, g, b] = [r, g, b].map(|value| f32::from(value) / 255.0 * alpha);
-                [r, g, b, alpha]
-            };
-            let pixels: Vec<_> = pixels.iter().map(premultiplied).collect();
-            ColorSpace::Srgb.over(&pixels, background)
-        }
+        Pixels::Srgb8(pixels) => srgb_over(pixels, 255.0, background),
+        Pixels::Srgb16(pixels) => srgb_over(pixels, 65_535.0, background),
         Pixels::Linear(pixels) => ColorSpace::Linear.over(pixels, background),
     }
+}
+
+/// Straight sRGB pixels whose values reach up to `most`, as they are encoded, over a background.
+fn srgb_over<T: Copy + Into<f32>>(pixels: &[[T; 4]], most: f32, background: [f32; 3]) -> Vec<[f32; 3]> {
+    let premultiplied = |pixel: &[T; 4]| {
+        let [r, g, b, alpha] = pixel.map(|value| value.into() / most);
+        [r * alpha, g * alpha, b * alpha, alpha]
+    };
+    let pixels: Vec<_> = pixels.iter().map(premultiplied).collect();
+    ColorSpace::Srgb.over(&pixels, background)
 }
 
 /// Opaque 8-bit pixels of display-referred colours in `[0, 1]`.

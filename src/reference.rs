@@ -17,6 +17,7 @@ pub mod composite;
 pub mod grid;
 pub mod harmonics;
 pub mod lens;
+pub mod loss;
 pub mod march;
 pub mod mlp;
 pub mod model;

@@ -78,7 +78,7 @@ impl Renderer {
         let pixels = camera.width as usize * camera.height as usize;
         let mut color = Vec::with_capacity(pixels);
         let mut depth = Vec::with_capacity(pixels);
-        let camera_in_box = kernels::Camera::in_box(camera, &self.bounds, 0);
+        let camera_in_box = kernels::Camera::in_box(camera, &self.bounds);
         self.gpu.write(self.workspace.get("cameras"), 0, &[camera_in_box]);
         while color.len() < pixels {
             let asked = (self.rays as usize).min(pixels - color.len());

@@ -3,16 +3,13 @@
 //! It knows neither files nor progress bars: a step is a list of dispatches, and [`Trainer::report`] says
 //! what happened since the last report.
 
-use crate::camera::Camera;
-use crate::dataset::Bounds;
 use crate::gpu::Gpu;
-use crate::gpu::buffer::Buffer;
 use crate::gpu::pass::Stage;
 use crate::gpu::timer::Timer;
-use crate::image::{Image, Pixels};
 use crate::kernels::{self, Counters, Plan, Step, Workspace, color, density, marching, occupancy, training};
 use crate::model::{FEATURES, pcg};
-use crate::visibility;
+use crate::views::Views;
+use crate::visibility::hidden_cells;
 use anyhow::{Result, bail};
 use std::sync::Arc;
 
@@ -65,23 +62,15 @@ pub struct State {
     pub occupancy_bits: Vec<u32>,
 }
 
-/// The training views.
-#[derive(Clone, Copy, Debug)]
-pub struct Views<'a> {
-    /// Their cameras, in world space.
-    pub cameras: &'a [Camera],
-    /// Their images, of the cameras' sizes.
-    pub images: &'a [Image],
-    /// The scene's box.
-    pub bounds: &'a Bounds,
-}
-
 impl Trainer {
     /// Allocates, uploads and builds every kernel; parameters start from the configuration's seed.
     ///
     /// # Errors
-    /// When the adapter cannot hold the images, the table or the batch, or refuses a kernel.
-    pub fn new(gpu: &Arc<Gpu>, plan: Plan, views: &Views<'_>) -> Result<Self> {
+    /// When a photo is missing, or the adapter cannot hold the table or the batch or refuses a kernel.
+    pub fn new(gpu: &Arc<Gpu>, mut plan: Plan, views: Views) -> Result<Self> {
+        views.check()?;
+        // Photos of which nothing can be drawn are never chosen.
+        plan.needs.cameras = views.on_device.len();
         let mut workspace = Workspace::default();
         marching::allocate(gpu, &plan, &mut workspace)?;
         density::allocate_parameters(gpu, &plan, &mut workspace)?;
@@ -89,11 +78,12 @@ impl Trainer {
         color::allocate(gpu, &plan, &mut workspace)?;
         training::allocate(gpu, &plan, &mut workspace)?;
         let hidden =
-            visibility::hidden_cells(views.cameras, views.images, views.bounds, plan.config.occupancy.cells);
+            hidden_cells(&views.cameras, &views.silhouettes, &views.bounds, plan.config.occupancy.cells);
         let visible: Vec<u32> =
             (0..).zip(&hidden).filter(|(_, hidden)| !**hidden).map(|(cell, _)| cell).collect();
         occupancy::allocate(gpu, &mut workspace, &visible)?;
-        upload(gpu, views, &mut workspace)?;
+        workspace.add(gpu.storage_with("cameras", &views.on_device)?);
+        workspace.add_banks(views.banks);
         let stages = step_stages(gpu, &plan, &workspace)?;
         let occupancy = occupancy::Update::new(gpu, &plan, &workspace)?;
         let first_occupancy = hidden.iter().map(|&hidden| if hidden { -1.0 } else { 0.0 }).collect();
@@ -308,38 +298,4 @@ fn step_stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stag
     stages.extend(training::weight_gradients(gpu, plan, workspace)?);
     stages.extend(training::update(gpu, plan, workspace)?);
     Ok(stages)
-}
-
-/// Cameras in box space, and the pixels of all images one behind the other.
-fn upload(gpu: &Gpu, views: &Views<'_>, workspace: &mut Workspace) -> Result<()> {
-    let mut first_texel = 0;
-    let mut cameras = Vec::with_capacity(views.cameras.len());
-    for camera in views.cameras {
-        cameras.push(kernels::Camera::in_box(camera, views.bounds, first_texel as u32));
-        first_texel += camera.width as usize * camera.height as usize;
-    }
-    if u32::try_from(first_texel).is_err() {
-        bail!("the images have {first_texel} pixels together, and at most {} can be addressed", u32::MAX);
-    }
-    workspace.add(gpu.storage_with("cameras", &cameras)?);
-    let hdr = views.images.iter().any(Image::is_hdr);
-    let pixels = if hdr {
-        gpu.storage::<[f32; 4]>("pixels", first_texel)?
-    } else {
-        gpu.storage::<u32>("pixels", first_texel)?
-    };
-    let mut first = 0;
-    for image in views.images {
-        write_pixels(gpu, &pixels, first, &image.pixels);
-        first += image.width as usize * image.height as usize;
-    }
-    workspace.add(pixels);
-    Ok(())
-}
-
-fn write_pixels(gpu: &Gpu, buffer: &Buffer, first: usize, pixels: &Pixels) {
-    match pixels {
-        Pixels::Srgb8(data) => gpu.write(buffer, first, data),
-        Pixels::Linear(data) => gpu.write(buffer, first, data),
-    }
 }

@@ -3,11 +3,13 @@
 //! Leaving them out from the start saves the first steps of a training, which would otherwise fill the box
 //! with fog and dissolve it again.
 
+mod silhouette;
+
 use crate::camera::Camera;
 use crate::dataset::Bounds;
-use crate::image::{Image, Pixels};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+pub use silhouette::Silhouette;
 
 /// Views that must agree that a cell is empty: one wrong mask or pose must not cut a hole.
 const VIEWS_TO_CARVE: usize = 2;
@@ -29,10 +31,15 @@ enum Sight {
 /// `true` for each cell (of `cells`³ per cascade, inner cascade first, x fastest) that no camera sees or that
 /// the alpha of several images shows to be empty.
 #[must_use]
-pub fn hidden_cells(cameras: &[Camera], images: &[Image], bounds: &Bounds, cells: u32) -> Vec<bool> {
+pub fn hidden_cells(
+    cameras: &[Camera],
+    silhouettes: &[Silhouette],
+    bounds: &Bounds,
+    cells: u32,
+) -> Vec<bool> {
     let views: Vec<View<'_>> =
-        cameras.iter().zip(images).map(|(camera, image)| View::new(camera, image)).collect();
-    let carves = views.iter().any(|view| !view.opaque_sums.is_empty());
+        cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
+    let carves = views.iter().any(|view| !view.silhouette.is_opaque());
     let per_cascade = cells.pow(3);
     (0..per_cascade * bounds.cascades)
         .into_par_iter()
@@ -75,15 +82,12 @@ struct View<'a> {
     /// Largest angle of a pixel's ray to the view axis, in radians: what lies outside this cone need not be
     /// projected.
     half_angle: f64,
-    /// Number of pixels with any alpha in the rectangle from the corner to here, `(width + 1) × (height + 1)`;
-    /// empty for an opaque image.
-    opaque_sums: Vec<u32>,
+    silhouette: &'a Silhouette,
 }
 
 impl<'a> View<'a> {
-    fn new(camera: &'a Camera, image: &Image) -> Self {
-        let opaque_sums = if image.has_alpha { opaque_sums(image) } else { Vec::new() };
-        Self { camera, half_angle: half_angle(camera), opaque_sums }
+    fn new(camera: &'a Camera, silhouette: &'a Silhouette) -> Self {
+        Self { camera, half_angle: half_angle(camera), silhouette }
     }
 
     /// What this view says of a ball.
@@ -108,17 +112,10 @@ impl<'a> View<'a> {
             return Sight::Unseen;
         }
         let inside = low.cmpge(DVec2::ZERO).all() && high.cmple(size).all();
-        if inside && !self.opaque_sums.is_empty() && self.count_opaque(low, high) == 0 {
+        if inside && self.silhouette.is_empty_within(low, high) {
             return Sight::Empty;
         }
         Sight::Seen
-    }
-
-    fn count_opaque(&self, low: DVec2, high: DVec2) -> u32 {
-        let stride = self.camera.width as usize + 1;
-        let at = |x: f64, y: f64| self.opaque_sums[y as usize * stride + x as usize];
-        let (low, high) = (low.floor(), high.ceil());
-        (at(high.x, high.y) + at(low.x, low.y)) - at(low.x, high.y) - at(high.x, low.y)
     }
 }
 
@@ -134,21 +131,4 @@ fn half_angle(camera: &Camera) -> f64 {
     rim.map(angle)
         .try_fold(0.0, |most: f64, angle| angle.map(|angle| most.max(angle)))
         .map_or(std::f64::consts::FRAC_PI_2, |most| most + margin)
-}
-
-fn opaque_sums(image: &Image) -> Vec<u32> {
-    let (width, height) = (image.width as usize, image.height as usize);
-    let is_opaque = |index: usize| match &image.pixels {
-        Pixels::Srgb8(pixels) => pixels[index][3] > 0,
-        Pixels::Linear(pixels) => pixels[index][3] > 0.0,
-    };
-    let mut sums = vec![0; (width + 1) * (height + 1)];
-    for y in 0..height {
-        let mut row = 0;
-        for x in 0..width {
-            row += u32::from(is_opaque(y * width + x));
-            sums[(y + 1) * (width + 1) + x + 1] = sums[y * (width + 1) + x + 1] + row;
-        }
-    }
-    sums
 }

@@ -4,6 +4,7 @@ use glam::DVec3;
 use nerf::reference::activation::{color, color_backward, log_density, log_density_backward};
 use nerf::reference::composite::{CompositeInput, CompositeOutput, composite};
 use nerf::reference::grid::{FEATURES, grid_encode, grid_encode_backward, levels, table_entries};
+use nerf::reference::loss::Loss;
 use nerf::reference::mlp::Mlp;
 use nerf::reference::model::{Model, Objective, RaySample, TrainingRay};
 use nerf::reference::random::{random_u32, uniform};
@@ -207,6 +208,7 @@ fn tiny_batch(random: &mut Random, rays: usize) -> Vec<TrainingRay> {
         position: DVec3::from_array(random.triple(0.0, 1.0)),
         delta: random.number(0.05, 0.5),
         gain: 1.0,
+        distance: random.number(0.0, 2.0),
     };
     (0..rays)
         .map(|count| TrainingRay {
@@ -214,6 +216,7 @@ fn tiny_batch(random: &mut Random, rays: usize) -> Vec<TrainingRay> {
             samples: (0..count).map(|_| sample(random)).collect(),
             target: std::array::from_fn(|_| random.number(0.0, 1.0)),
             background: random.triple(0.0, 1.0),
+            depth: if count % 3 == 1 { 0.0 } else { random.number(0.1, 1.5) },
         })
         .collect()
 }
@@ -225,7 +228,8 @@ fn whole_step_gradients_are_slopes() {
     let rays = tiny_batch(&mut random, 5);
     for transmittance in CONVENTIONS {
         for color_range in [ColorRange::Ldr, ColorRange::Hdr] {
-            let objective = Objective { transmittance, color_range };
+            let loss = Loss { is_relative: false, depth: 0.3 };
+            let objective = Objective { transmittance, color_range, loss };
             let gradients = model.forward_backward(objective, &rays).gradients;
             let by_table = |table: &[f64]| {
                 let moved = Model { table: table.to_vec(), ..model.clone() };

@@ -7,12 +7,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use nerf::config::{Accumulation, Config};
+use nerf::gpu::banks::Capacity;
 use nerf::gpu::kernel::{Layout as StructLayout, Shared};
 use nerf::gpu::source::{Linked, Source};
 use nerf::gpu::tensor::Memory;
 use nerf::kernels::layer::Product;
 use nerf::kernels::training::Tile;
-use nerf::kernels::{Camera, Counters, Needs, Plan, Step};
+use nerf::kernels::{Camera, Counters, Needs, Plan, Step, photos};
 use nerf::model::{Layout, Level};
 use wgpu::naga;
 
@@ -61,7 +62,7 @@ fn definitions(text: &str) -> Vec<String> {
 
 fn plan(memory: Memory, cascades: u32) -> Plan {
     let config = Config::default();
-    let needs = Needs { lens: true, alpha: true, hdr: false, cascades, cameras: 3 };
+    let needs = Needs { lens: true, alpha: true, cascades, cameras: 3, ..Needs::default() };
     let layout = Layout::new(&config, 2048);
     let product = Product { rows: 2, shared_weights: false };
     Plan { config, layout, needs, product, accumulation: Accumulation::Exchange, memory, chunks: 32 }
@@ -85,7 +86,11 @@ const SHARED: [StructLayout; 5] =
 
 impl Linker {
     fn new(plan: Plan) -> Self {
-        let parts: Vec<File> = files().into_iter().filter(|(name, _)| name.contains('/')).collect();
+        let mut parts: Vec<File> = files().into_iter().filter(|(name, _)| name.contains('/')).collect();
+        // What reads the photos depends on how many banks they fill.
+        let capacity = Capacity::of(&wgpu::Limits::default(), plan.memory);
+        let photos = |banks| (format!("photos in {banks} banks"), capacity.part(photos::NAME, banks));
+        parts.extend([photos(1), photos(3)]);
         let mut definers: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for (index, (_, text)) in parts.iter().enumerate() {
             for name in definitions(text) {
@@ -198,7 +203,19 @@ fn every_combination_links() {
 /// A folder is a slot: its files define the same functions, so that each can take another's place.
 #[test]
 fn variants_are_interchangeable() {
-    for slot in ["activation", "background", "lens", "pixels", "stepping", "transmittance", "weights"] {
+    for slot in [
+        "activation",
+        "background",
+        "depth_loss",
+        "depth_target",
+        "lens",
+        "loss",
+        "pixels",
+        "position",
+        "stepping",
+        "transmittance",
+        "weights",
+    ] {
         let mut wanted: Option<(String, BTreeSet<String>)> = None;
         for (name, text) in files().into_iter().filter(|(name, _)| name.starts_with(&format!("{slot}/"))) {
             let prefix =

@@ -10,7 +10,8 @@ use nerf::kernels::training::STATE;
 use nerf::kernels::{Counters, Needs, Plan};
 use nerf::model::Layout;
 use nerf::render::{Renderer, View};
-use nerf::train::{State, StepStats, Trainer, Views};
+use nerf::train::{State, StepStats, Trainer};
+use nerf::views::Views;
 use std::sync::Arc;
 
 const LEARNING_RATE: f64 = 1e-2;
@@ -94,16 +95,16 @@ impl Scene {
         let gpu = Arc::new(Gpu::open(&adapter).expect("it opens"));
         let (cameras, images, bounds) = (self.cameras(), self.images(), self.bounds());
         let needs = Needs {
-            lens: false,
             alpha: self.has_alpha,
             hdr: images.iter().any(Image::is_hdr),
-            cascades: 1,
             cameras: cameras.len(),
+            ..Needs::default()
         };
         let layout = Layout::new(&config, 64);
         let plan = Plan::new(&gpu, config, layout, needs);
-        let views = Views { cameras: &cameras, images: &images, bounds: &bounds };
-        let trainer = Trainer::new(&gpu, plan, &views).expect("a trainer");
+        let mut views = Views::new(&gpu, &plan, &cameras, &bounds).expect("room");
+        images.into_iter().for_each(|image| views.add(&image.into()).expect("its photo"));
+        let trainer = Trainer::new(&gpu, plan, views).expect("a trainer");
         Training { trainer, gpu, camera: cameras[0].clone(), bounds }
     }
 }

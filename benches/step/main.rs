@@ -21,7 +21,8 @@ use nerf::image::Image;
 use nerf::kernels::{Needs, Plan};
 use nerf::model::{Layout, finest_resolution};
 use nerf::scene;
-use nerf::train::{StepStats, Trainer, Views};
+use nerf::train::{StepStats, Trainer};
+use nerf::views::Views;
 use report::{result, table};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -314,9 +315,12 @@ fn trainer(gpu: &Arc<Gpu>, config: Config, dataset: &Dataset, images: &[Image]) 
         hdr: dataset.is_hdr,
         cascades: dataset.bounds.cascades,
         cameras: cameras.len(),
+        ..Needs::default()
     };
     let plan = Plan::new(gpu, config, layout, needs);
-    Trainer::new(gpu, plan, &Views { cameras: &cameras, images, bounds: &dataset.bounds })
+    let mut views = Views::new(gpu, &plan, &cameras, &dataset.bounds)?;
+    images.iter().try_for_each(|image| views.add(&image.clone().into()))?;
+    Trainer::new(gpu, plan, views)
 }
 
 /// Slowest first; what no stage accounts for comes last.

@@ -7,10 +7,11 @@ struct Camera {
     right: vec3<f32>,
     height: u32,
     up: vec3<f32>,
-    // Index of the image's first pixel.
-    first_texel: u32,
+    // The photo's first row in the banks.
+    first_row: u32,
     back: vec3<f32>,
-    unused: u32,
+    // Pixels that can be drawn, at least 1.
+    pixel_count: u32,
     focal_px: vec2<f32>,
     center_px: vec2<f32>,
     radial: vec4<f32>,

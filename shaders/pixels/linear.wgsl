@@ -1,8 +1,12 @@
-// Provides: pixel_target for float images (scene-linear, premultiplied).
-
-var<storage, read> pixels: array<vec4<f32>>;
+// Needs: photos_word. Provides: photo_color for float photos (scene-linear, premultiplied).
 
 // Colour premultiplied by alpha, and alpha.
-fn pixel_target(texel: u32) -> vec4<f32> {
-    return pixels[texel];
+fn photo_color(first_row: u32, drawn: u32) -> vec4<f32> {
+    let word = drawn * RECORD_WORDS;
+    return bitcast<vec4<f32>>(vec4(
+        photos_word(first_row, word),
+        photos_word(first_row, word + 1u),
+        photos_word(first_row, word + 2u),
+        photos_word(first_row, word + 3u),
+    ));
 }

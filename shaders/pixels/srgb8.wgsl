@@ -1,9 +1,7 @@
-// Provides: pixel_target for 8-bit images (straight alpha, kept in their display-referred values).
-
-var<storage, read> pixels: array<u32>;
+// Needs: photos_word. Provides: photo_color for 8-bit photos (straight alpha, kept in their display-referred values).
 
 // Colour premultiplied by alpha, and alpha.
-fn pixel_target(texel: u32) -> vec4<f32> {
-    let color = unpack4x8unorm(pixels[texel]);
+fn photo_color(first_row: u32, drawn: u32) -> vec4<f32> {
+    let color = unpack4x8unorm(photos_word(first_row, drawn * RECORD_WORDS));
     return vec4(color.rgb * color.a, color.a);
 }

@@ -1,8 +1,6 @@
-// Provides: pixel_target for 8-bit images without alpha (kept in their display-referred values).
-
-var<storage, read> pixels: array<u32>;
+// Needs: photos_word. Provides: photo_color for 8-bit photos without alpha (kept in their display-referred values).
 
 // Colour, and alpha 1.
-fn pixel_target(texel: u32) -> vec4<f32> {
-    return vec4(unpack4x8unorm(pixels[texel]).rgb, 1.0);
+fn photo_color(first_row: u32, drawn: u32) -> vec4<f32> {
+    return vec4(unpack4x8unorm(photos_word(first_row, drawn * RECORD_WORDS)).rgb, 1.0);
 }

@@ -65,7 +65,7 @@ impl Random {
 }
 
 /// `samples` samples on `rays` rays, some of them empty. Positions lie in the box, steps in 0.01..0.3, targets and
-/// backgrounds in 0..1.
+/// backgrounds in 0..1. Every third ray has no known depth; distances are from the origin of box space.
 pub fn random_batch(random: &mut Random, rays: usize, samples: usize) -> Vec<TrainingRay> {
     let mut counts = vec![0; rays];
     // The first and every seventh ray stay empty, unless it is the only one.
@@ -73,17 +73,21 @@ pub fn random_batch(random: &mut Random, rays: usize, samples: usize) -> Vec<Tra
     for sample in 0..if filled.is_empty() { 0 } else { samples } {
         counts[filled[sample * sample % filled.len()]] += 1;
     }
-    let sample = |random: &mut Random| RaySample {
-        position: random.vector(0.0, 1.0),
-        delta: random.number(0.01, 0.3),
-        gain: 1.0,
+    let sample = |random: &mut Random, direction: DVec3| {
+        let position = random.vector(0.0, 1.0);
+        let (delta, distance) = (random.number(0.01, 0.3), position.dot(direction));
+        RaySample { position, delta, gain: 1.0, distance }
     };
-    (counts.into_iter())
-        .map(|count| TrainingRay {
-            direction: random.direction(),
-            samples: (0..count).map(|_| sample(random)).collect(),
-            target: random.vector(0.0, 1.0).extend(random.number(0.0, 1.0)).to_array(),
-            background: random.vector(0.0, 1.0).to_array(),
+    (counts.into_iter().enumerate())
+        .map(|(ray, count)| {
+            let direction = random.direction();
+            TrainingRay {
+                direction,
+                samples: (0..count).map(|_| sample(random, direction)).collect(),
+                target: random.vector(0.0, 1.0).extend(random.number(0.0, 1.0)).to_array(),
+                background: random.vector(0.0, 1.0).to_array(),
+                depth: if ray % 3 == 2 { 0.0 } else { f64::from(random.number(0.1, 1.5) as f32) },
+            }
         })
         .collect()
 }

@@ -70,11 +70,12 @@ pub fn positions(random: &mut Random, count: usize) -> Vec<DVec3> {
 
 /// A ray whose samples lie at `positions`.
 fn one_ray(positions: &[DVec3]) -> TrainingRay {
-    let sample = |&position| RaySample { position, delta: 0.1, gain: 1.0 };
+    let sample = |&position| RaySample { position, delta: 0.1, gain: 1.0, distance: 0.0 };
     TrainingRay {
         direction: DVec3::Z,
         samples: positions.iter().map(sample).collect(),
         target: [0.0; 4],
         background: [0.0; 3],
+        depth: 0.0,
     }
 }

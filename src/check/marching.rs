@@ -92,7 +92,7 @@ impl Marching {
         let mut bench = subject.workbench(setup)?;
         let cameras: Vec<_> = rays.iter().map(|ray| pixel_camera(ray.origin, ray.direction)).collect();
         bench.workspace.add(bench.gpu.storage_with("cameras", &cameras)?);
-        bench.workspace.add(bench.gpu.storage::<u32>("pixels", 1)?);
+        bench.add_photos(&[])?;
         let stages = |jitter| -> Result<Vec<Stage>> {
             let mut stages = vec![training::rays(&bench.gpu, &bench.plan, &bench.workspace)?];
             stages.extend(marching::stages(&bench.gpu, &bench.plan, &bench.workspace, jitter)?);
@@ -124,7 +124,7 @@ impl Marching {
         let counters = self.bench.counters()?;
         let spans: Vec<[u32; 2]> = self.bench.read("ray_spans", count)?;
         let samples: Vec<[f32; 4]> = self.bench.read("samples", counters.samples as usize)?;
-        let sizes = vec![(1, 1); self.rays.len()];
+        let pixels = vec![1; self.rays.len()];
         let mut packed = 0;
         for (index, span) in spans.iter().enumerate() {
             let [first, number] = span.map(|x| x as usize);
@@ -135,7 +135,7 @@ impl Marching {
             }
             packed += number;
             let start = if jitter { uniform(index, dimension::OFFSET) } else { 0.5 };
-            let ray = Ray { march, ray: self.rays[drawn(index, &sizes).0], start, words };
+            let ray = Ray { march, ray: self.rays[drawn(index, &pixels).0], start, words };
             ray.compare(found, &samples[first..packed], &format!("{case}, ray {index}"));
         }
         let all = packed == samples.len()

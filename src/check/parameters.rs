@@ -5,6 +5,7 @@ use super::draw::Random;
 use crate::config::{self, Accumulation};
 use crate::model::{FEATURES, Layer};
 use crate::reference::grid::GridLevel;
+use crate::reference::loss::Loss;
 use crate::reference::mlp::{self, Mlp};
 use crate::reference::model::{Model, Objective};
 use crate::reference::{ColorRange, Transmittance};
@@ -160,7 +161,9 @@ impl Workbench {
             config::Transmittance::Inclusive => Transmittance::Inclusive,
         };
         let color_range = if self.plan.needs.hdr { ColorRange::Hdr } else { ColorRange::Ldr };
-        Objective { transmittance, color_range }
+        let depth = if self.plan.needs.depth { self.plan.config.loss.depth } else { 0.0 };
+        let loss = Loss { is_relative: self.plan.has_relative_loss(), depth };
+        Objective { transmittance, color_range, loss }
     }
 }
 

@@ -1,12 +1,11 @@
-//! Rays through pixels: those of a view through every lens, and those of a training with their targets.
+//! Rays through the pixels of a view, through every lens.
 
-use super::draw::{Random, SEED, STEP, quiet_step, uniform};
+use super::draw::{Random, SEED, STEP, quiet_step};
 use super::{Setup, Subject, Tally, Workbench};
 use crate::camera::{Camera, Lens};
-use crate::config::Background;
 use crate::dataset::Bounds;
 use crate::gpu::pass::Stage;
-use crate::kernels::{self, Step, dimension, training, viewing};
+use crate::kernels::{self, Step, dimension, viewing};
 use crate::reference::lens::Distortion;
 use crate::reference::march::{BoxRay, box_interval};
 use crate::reference::random::random_u32;
@@ -45,7 +44,7 @@ impl DeviceRay {
 
 /// Lenses of a phone and of an action camera, a wide one, a strong barrel that folds within the image, and a
 /// pincushion.
-const LENSES: [(&str, Lens); 7] = [
+pub(super) const LENSES: [(&str, Lens); 7] = [
     ("pinhole", Lens::Pinhole),
     ("no distortion", open_cv([0.0; 4], [0.0; 2])),
     ("mild", open_cv([0.05, -0.08, 0.02, 0.0], [1e-3, -5e-4])),
@@ -59,12 +58,12 @@ const fn open_cv(k: [f64; 4], p: [f64; 2]) -> Lens {
     Lens::OpenCv { k, p }
 }
 
-fn bounds() -> Bounds {
+pub(super) fn bounds() -> Bounds {
     Bounds { center: DVec3::new(0.5, -1.0, 2.0), half: 1.5, cascades: 1, source: String::new() }
 }
 
 /// A camera that looks at the box, its principal point off the centre.
-fn camera(random: &mut Random, (width, height): (u32, u32), lens: Lens) -> Camera {
+pub(super) fn camera(random: &mut Random, (width, height): (u32, u32), lens: Lens) -> Camera {
     let rotation = DQuat::from_rotation_y(random.number(-3.0, 3.0))
         * DQuat::from_rotation_x(random.number(-1.2, 1.2))
         * DQuat::from_rotation_z(random.number(-3.0, 3.0));
@@ -84,7 +83,7 @@ fn camera(random: &mut Random, (width, height): (u32, u32), lens: Lens) -> Camer
 
 /// Whether rounding decides if there is a ray: a little nearer to the centre or farther from it there is another
 /// answer.
-fn is_close_to_a_fold(camera: &Camera, pixel: DVec2) -> bool {
+pub(super) fn is_close_to_a_fold(camera: &Camera, pixel: DVec2) -> bool {
     let seen = |scale: f64| camera.ray(camera.center_px + (pixel - camera.center_px) * scale).is_some();
     [0.97, 1.03].iter().any(|&scale| seen(scale) != seen(1.0))
 }
@@ -158,7 +157,7 @@ impl View<'_> {
     /// The rays, in two chunks of which the second starts in the middle of a row.
     fn draw(&self) -> Result<Vec<DeviceRay>> {
         let Self { camera, bench, .. } = self;
-        bench.write("cameras", &[kernels::Camera::in_box(camera, &bounds(), 0)]);
+        bench.write("cameras", &[kernels::Camera::in_box(camera, &bounds())]);
         let pixels = (camera.width * camera.height) as usize;
         let mut rays = Vec::new();
         for (first, count) in [(0, 130), (130, pixels - 130)] {
@@ -197,12 +196,12 @@ fn compare_interval(tally: &mut Tally, ray: &DeviceRay, near: f64, case: impl Fn
     }
 }
 
-/// Which view and which of its pixels the kernel draws for a ray.
+/// Which view and which of its pixels, of which each has so many, the kernel draws for a ray.
 #[must_use]
-pub fn drawn(ray: usize, sizes: &[(u32, u32)]) -> (usize, u32) {
+pub fn drawn(ray: usize, pixels: &[u32]) -> (usize, u32) {
     let draw = |dimension| random_u32(SEED, STEP, ray as u32, dimension);
-    let view = draw(dimension::IMAGE) as usize % sizes.len();
-    (view, draw(dimension::PIXEL) % (sizes[view].0 * sizes[view].1))
+    let view = draw(dimension::IMAGE) as usize % pixels.len();
+    (view, draw(dimension::PIXEL) % pixels[view])
 }
 
 /// A camera of one pixel whose only ray goes along `direction`, all of it in box space.
@@ -219,109 +218,7 @@ pub fn pixel_camera(origin: DVec3, direction: DVec3) -> kernels::Camera {
         back: array(-direction),
         focal_px: [1.0; 2],
         center_px: [0.5; 2],
+        pixel_count: 1,
         ..kernels::Camera::default()
     }
-}
-
-/// Images of a batch: their sizes, cameras and pixels.
-struct Images {
-    sizes: [(u32, u32); 4],
-    cameras: Vec<Camera>,
-    first_texels: Vec<u32>,
-    /// Premultiplied colour and alpha of all pixels, as a target should have them.
-    pixels: Vec<[f64; 4]>,
-}
-
-/// Rays, targets and backgrounds that a training draws, from images of all kinds.
-///
-/// # Errors
-/// When the device was lost or refuses a kernel.
-pub fn training_rays(subject: &Subject) -> Result<Tally> {
-    let mut tally =
-        Tally::new("rays of a training", 4e-7, "a rotation, a unit vector, a product of colours round");
-    let backgrounds =
-        [Background::Black, Background::Random, Background::Random, Background::Color([0.25, 0.5, 0.75])];
-    let kinds = [(false, true), (true, true), (false, true), (false, false)];
-    for (background, (hdr, alpha)) in backgrounds.into_iter().zip(kinds) {
-        let mut setup = Setup::tiny().hdr(hdr);
-        setup.config.background = background;
-        setup.needs.alpha = alpha;
-        setup.needs.lens = true;
-        setup.needs.cameras = 4;
-        let mut bench = subject.workbench(setup)?;
-        let images = Images::upload(&mut bench, &mut Random::new(41))?;
-        let stage = training::rays(&bench.gpu, &bench.plan, &bench.workspace)?;
-        for count in [1, 3, 65, 250] {
-            bench.set_rays(count);
-            bench.run([&stage])?;
-            let case = format!("{background:?}, hdr {hdr}, alpha {alpha}, {count} rays");
-            images.compare(&mut tally, &case, &bench, count)?;
-        }
-    }
-    Ok(tally)
-}
-
-impl Images {
-    fn upload(bench: &mut Workbench, random: &mut Random) -> Result<Self> {
-        let sizes = [(5, 3), (4, 4), (1, 1), (2, 31)];
-        let cameras = sizes.map(|size| camera(random, size, LENSES[3].1)).to_vec();
-        let mut first_texels = vec![0];
-        first_texels.extend(sizes.iter().scan(0, |sum, (width, height)| {
-            *sum += width * height;
-            Some(*sum)
-        }));
-        let texels = first_texels.pop().unwrap_or(0);
-        let on_device: Vec<_> = (cameras.iter().zip(&first_texels))
-            .map(|(camera, &first)| kernels::Camera::in_box(camera, &bounds(), first))
-            .collect();
-        let (gpu, workspace) = (&bench.gpu, &mut bench.workspace);
-        workspace.add(gpu.storage_with("cameras", &on_device)?);
-        let alpha = bench.plan.needs.alpha;
-        let pixels = if bench.plan.needs.hdr {
-            let mut pixel = || std::array::from_fn(|_| random.number(0.0, 1.0) as f32);
-            let data: Vec<[f32; 4]> = (0..texels).map(|_| pixel()).collect();
-            workspace.add(gpu.storage_with("pixels", &data)?);
-            data.iter().map(|pixel| pixel.map(f64::from)).collect()
-        } else {
-            let mut pixel = || std::array::from_fn(|_| random.number(0.0, 256.0) as u8);
-            let data: Vec<[u8; 4]> = (0..texels).map(|_| pixel()).collect();
-            workspace.add(gpu.storage_with("pixels", &data)?);
-            data.iter().map(|&pixel| premultiplied(pixel, alpha)).collect()
-        };
-        Ok(Self { sizes, cameras, first_texels, pixels })
-    }
-
-    fn compare(&self, tally: &mut Tally, case: &str, bench: &Workbench, count: usize) -> Result<()> {
-        let targets: Vec<[f32; 4]> = bench.read("targets", count)?;
-        let backgrounds: Vec<[f32; 4]> = bench.read("backgrounds", count)?;
-        for (index, ray) in DeviceRay::read(bench, count)?.into_iter().enumerate() {
-            let case = format!("{case}, ray {index}");
-            let (view, texel) = drawn(index, &self.sizes);
-            let camera = &self.cameras[view];
-            let pixel =
-                DVec2::new(f64::from(texel % camera.width) + 0.5, f64::from(texel / camera.width) + 0.5);
-            if let Some(want) = camera.ray(pixel).filter(|_| !is_close_to_a_fold(camera, pixel)) {
-                tally.each(&case, &ray.direction.to_array(), &want.direction.to_array(), |_| 1.0);
-            }
-            let behind = match bench.plan.config.background {
-                Background::Random => {
-                    [0, 1, 2].map(|channel| uniform(index, dimension::BACKGROUND + channel))
-                }
-                solid => solid.solid().map(f64::from),
-            };
-            let [r, g, b, alpha] = self.pixels[(self.first_texels[view] + texel) as usize];
-            let over = |color: f64, channel: usize| color + (1.0 - alpha) * behind[channel];
-            let target = [over(r, 0), over(g, 1), over(b, 2), alpha];
-            tally.each(&format!("{case}, target"), &targets[index], &target, |_| 1.0);
-            let want = [behind[0], behind[1], behind[2], 0.0];
-            tally.each(&format!("{case}, background"), &backgrounds[index], &want, |_| 1.0);
-        }
-        Ok(())
-    }
-}
-
-fn premultiplied([r, g, b, a]: [u8; 4], has_alpha: bool) -> [f64; 4] {
-    let alpha = if has_alpha { f64::from(a) / 255.0 } else { 1.0 };
-    let [r, g, b] = [r, g, b].map(|x| f64::from(x) / 255.0 * alpha);
-    [r, g, b, alpha]
 }

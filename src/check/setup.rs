@@ -43,7 +43,7 @@ impl Setup {
             seed: SEED,
             ..Config::default()
         };
-        let needs = Needs { lens: false, alpha: true, hdr: false, cascades: 1, cameras: 1 };
+        let needs = Needs { alpha: true, ..Needs::default() };
         Self { config, needs, finest: 40, product: None, memory: None }
     }
 

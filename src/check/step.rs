@@ -5,13 +5,15 @@ use super::tally::largest;
 use super::{Setup, Subject, Tally, Workbench};
 use crate::camera::{Camera, Lens};
 use crate::config::{Background, Optimizer, Selection};
-use crate::dataset::Bounds;
+use crate::dataset::{Bounds, Photo};
 use crate::image::{Image, Pixels};
+use crate::kernels::Needs;
 use crate::reference::Transmittance;
 use crate::reference::adam::Adam;
-use crate::reference::model::{BatchOutput, Model, RaySample, TrainingRay};
+use crate::reference::model::{BatchOutput, Model, Objective, RaySample, TrainingRay};
 use crate::reference::step::Training;
-use crate::train::{StepStats, Trainer, Views};
+use crate::train::{StepStats, Trainer};
+use crate::views::Views;
 use anyhow::Result;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -27,19 +29,23 @@ pub struct TinyTraining {
     pub bench: Workbench,
 }
 
-/// What is trained, by name: plain, over random backgrounds, in the inclusive convention, and with linear light and
-/// cascades.
+/// What is trained, by name: plain, over random backgrounds, in the inclusive convention, with linear light and a relative loss in cascades,
+/// and with masks, depth and 16 bits.
 #[must_use]
-pub fn setups() -> [(&'static str, Setup); 4] {
+pub fn setups() -> [(&'static str, Setup); 5] {
     let mut random_background = Setup::tiny().network(32, 2);
     random_background.config.background = Background::Random;
     let mut cascades = Setup::tiny().network(32, 1).hdr(true);
     cascades.needs.cascades = 3;
+    let mut masks = Setup::tiny();
+    masks.config.loss.depth = 0.3;
+    (masks.needs.deep, masks.needs.masks, masks.needs.depth) = (true, true, true);
     [
         ("plain", Setup::tiny()),
         ("random background", random_background),
         ("inclusive", Setup::tiny().transmittance(Transmittance::Inclusive)),
         ("hdr, 3 cascades", cascades),
+        ("masks, depth, 16 bits", masks),
     ]
 }
 
@@ -66,7 +72,7 @@ pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
         tally.holds(filled && tiny.lengthened()? > 3, || format!("{name}: a thin batch"));
         let want = reference.step(&batch, LEARNING_RATE);
         tally.value(stats.loss, want.loss, want.loss, || format!("{name}: loss"));
-        let error = color_error(&want, &batch);
+        let error = color_error(&want, &batch, reference.objective);
         tally.value(stats.color_error, error, error, || format!("{name}: colour error"));
         compare_rays(&mut tally, name, &tiny.bench)?;
         compare_moments(&mut tally, name, &tiny.bench, &reference)?;
@@ -75,10 +81,12 @@ pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Mean squared error of red, green and blue.
-fn color_error(output: &BatchOutput, batch: &[TrainingRay]) -> f64 {
-    let squares =
-        |(got, ray): (&[f64; 4], &TrainingRay)| (0..3).map(|x| (got[x] - ray.target[x]).powi(2)).sum::<f64>();
+/// Mean squared error of red, green and blue, as they count.
+fn color_error(output: &BatchOutput, batch: &[TrainingRay], objective: Objective) -> f64 {
+    let squares = |(got, ray): (&[f64; 4], &TrainingRay)| {
+        let weights = objective.loss.weights(*got);
+        (0..3).map(|x| weights[x] * (got[x] - ray.target[x]).powi(2)).sum::<f64>()
+    };
     let sum: f64 = output.rendered.iter().zip(batch).map(squares).sum();
     sum / (3.0 * batch.len() as f64)
 }
@@ -154,13 +162,13 @@ impl TinyTraining {
         setup.config.batch.kept = 1024;
         setup.config.batch.samples = 4096;
         let mut random = Random::new(80);
-        let hdr = setup.needs.hdr;
-        let images: Vec<Image> = cameras.iter().map(|camera| image(&mut random, camera, hdr)).collect();
+        let photos: Vec<_> = cameras.iter().map(|camera| photo(&mut random, camera, &setup.needs)).collect();
         let cascades = setup.needs.cascades;
         let bounds = Bounds { center: DVec3::splat(0.5), half: 0.5, cascades, source: String::new() };
         let plan = setup.plan(&subject.gpu)?;
-        let views = Views { cameras: &cameras, images: &images, bounds: &bounds };
-        let trainer = Trainer::new(&subject.gpu, plan.clone(), &views)?;
+        let mut views = Views::new(&subject.gpu, &plan, &cameras, &bounds)?;
+        photos.iter().try_for_each(|photo| views.add(photo))?;
+        let trainer = Trainer::new(&subject.gpu, plan.clone(), views)?;
         let bench = Workbench::of(&subject.gpu, plan, trainer.workspace().clone())?;
         Ok(Self { trainer, bench })
     }
@@ -213,21 +221,29 @@ impl TinyTraining {
         let directions = bench.rays(rays)?;
         let targets: Vec<[f32; 4]> = bench.read("targets", rays)?;
         let backgrounds: Vec<[f32; 4]> = bench.read("backgrounds", rays)?;
-        let vector = |x: &[f32; 4]| DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
-        let sample = |kept: &super::Kept| RaySample {
-            position: samples.get(kept.sample as usize).map_or(DVec3::NAN, vector),
-            delta: f64::from(kept.delta),
-            gain: 1.0,
+        let depths: Vec<f32> = match bench.plan.needs.depth {
+            true => bench.read("depth_targets", rays)?,
+            false => vec![0.0; rays],
         };
-        let of_ray = |[first, count]: [u32; 2]| {
-            kept.iter().skip(first as usize).take(count as usize).map(sample).collect()
+        let scale = bench.plan.density_scale();
+        let vector = |x: &[f32; 4]| DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
+        let sample = |kept: &super::Kept, ray: usize| {
+            let position = samples.get(kept.sample as usize).map_or(DVec3::NAN, vector);
+            let [origin, direction] = directions[ray].each_ref().map(vector);
+            let distance = (position - origin).dot(direction) * scale;
+            RaySample { position, delta: f64::from(kept.delta), gain: 1.0, distance }
+        };
+        let of_ray = |ray: usize| {
+            let [first, count] = spans[ray].map(|x| x as usize);
+            kept.iter().skip(first).take(count).map(|kept| sample(kept, ray)).collect()
         };
         Ok((0..rays)
             .map(|ray| TrainingRay {
                 direction: vector(&directions[ray][1]),
-                samples: of_ray(spans[ray]),
+                samples: of_ray(ray),
                 target: targets[ray].map(f64::from),
                 background: vector(&backgrounds[ray]).to_array(),
+                depth: f64::from(depths[ray]),
             })
             .collect())
     }
@@ -254,15 +270,28 @@ fn cameras() -> Vec<Camera> {
         .collect()
 }
 
-/// About one colour with a little noise: something that a tiny field can learn.
-fn image(random: &mut Random, camera: &Camera, hdr: bool) -> Image {
+/// About one colour with a little noise: something that a tiny field can learn. Some pixels are ignored, and of some
+/// the depth is not known.
+fn photo(random: &mut Random, camera: &Camera, needs: &Needs) -> Photo {
     let count = camera.width * camera.height;
-    let pixels = if hdr {
+    let pixels = if needs.hdr {
         let pixel = |_| [4.0, 2.5, 0.5, 0.9].map(|x| (x * random.number(0.8, 1.0)) as f32);
         Pixels::Linear((0..count).map(pixel).collect())
+    } else if needs.deep {
+        let pixel = |_| [65_000.0, 40_000.0, 5_000.0, 60_000.0].map(|x| (x * random.number(0.8, 1.0)) as u16);
+        Pixels::Srgb16((0..count).map(pixel).collect())
     } else {
         let pixel = |_| [250.0, 150.0, 20.0, 230.0].map(|x| (x * random.number(0.8, 1.0)) as u8);
         Pixels::Srgb8((0..count).map(pixel).collect())
     };
-    Image { width: camera.width, height: camera.height, pixels, has_alpha: true }
+    let image = Image { width: camera.width, height: camera.height, pixels, has_alpha: true };
+    let mut photo = Photo::from(image);
+    if needs.masks {
+        photo.ignored = (0..count).map(|pixel| pixel % 3 == 0).collect();
+    }
+    if needs.depth {
+        let depth = |pixel| if pixel % 5 == 0 { 0.0 } else { random.number(1.0, 2.0) as f32 };
+        photo.depth = (0..count).map(depth).collect();
+    }
+    photo
 }

@@ -3,9 +3,10 @@
 use super::Setup;
 use super::draw::quiet_step;
 use crate::gpu::Gpu;
+use crate::gpu::banks::{Banks, Capacity, rows_of};
 use crate::gpu::pass::Stage;
 use crate::kernels::{
-    Counters, Plan, Step, Workspace, color, density, dispatch, marching, occupancy, training,
+    Counters, Plan, Step, Workspace, color, density, dispatch, marching, occupancy, photos, training,
 };
 use crate::model::DENSITY_OUTPUTS;
 use crate::reference::model::TrainingRay;
@@ -26,6 +27,9 @@ pub struct Workbench {
     /// The scan over marched samples.
     scan: Arc<Stage>,
 }
+
+/// Rows of a bank of photos: so few that some photos lie in two banks.
+const BANK_ROWS: usize = 3;
 
 /// A kept sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -189,6 +193,11 @@ impl Workbench {
         let targets: Vec<_> = rays.iter().map(|ray| ray.target.map(|x| x as f32)).collect();
         let backgrounds: Vec<_> =
             rays.iter().map(|ray| ray.background.map(|x| x as f32)).map(|[r, g, b]| [r, g, b, 0.0]).collect();
+        if self.plan.needs.depth {
+            let depths: Vec<_> = rays.iter().map(|ray| ray.depth as f32).collect();
+            self.write("depth_targets", &depths);
+            self.write("ray_origins", &vec![[0.0_f32; 4]; rays.len()]);
+        }
         self.write("ray_directions", &directions);
         self.write("ray_spans", &spans);
         self.write("samples", &samples);
@@ -197,6 +206,18 @@ impl Workbench {
         // The scan turns counts into spans and sets all dispatch sizes.
         self.set_rays(rays.len());
         self.run([&*self.scan])
+    }
+
+    /// Puts these words of photos on the device, in banks of a few rows.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold them.
+    pub fn add_photos(&mut self, words: &[u32]) -> Result<()> {
+        let capacity = Capacity::of(&self.gpu.device.limits(), self.plan.memory).with_bank_rows(BANK_ROWS);
+        let mut banks = Banks::new(&self.gpu, photos::NAME, rows_of(words.len()), capacity)?;
+        banks.write(&self.gpu, 0, words)?;
+        self.workspace.add_banks(banks);
+        Ok(())
     }
 
     /// Raw log-densities of the samples, as if the network had run.

@@ -18,7 +18,8 @@ use nerf::checkpoint::About;
 use nerf::dataset::{Dataset, OpenOptions};
 use nerf::report::views::TestViews;
 use nerf::schedule::Budget;
-use nerf::train::{Trainer, Views};
+use nerf::train::Trainer;
+use nerf::views::Views;
 use pace::Pace;
 use serde_json::{Value, json};
 use setup::{Setup, Wishes};
@@ -53,9 +54,11 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     };
     let load_seconds = clock.elapsed().as_secs_f64();
     let clock = Instant::now();
-    let views = Views { cameras: &setup.cameras, images: &images, bounds: &setup.about.bounds };
-    let mut trainer = Trainer::new(&gpu, setup.plan.clone(), &views)?;
-    drop(images);
+    let mut views = Views::new(&gpu, &setup.plan, &setup.cameras, &setup.about.bounds)?;
+    for image in images {
+        views.add(&image.into())?;
+    }
+    let mut trainer = Trainer::new(&gpu, setup.plan.clone(), views)?;
     trainer.warm_up()?;
     if let Some(state) = &setup.state {
         trainer.restore(state)?;

@@ -173,13 +173,16 @@ fn binding_type(module: &naga::Module, variable: &naga::GlobalVariable) -> wgpu:
                 view_dimension: wgpu::TextureViewDimension::D2,
             }
         }
-        (_, naga::TypeInner::Image { class: naga::ImageClass::Sampled { kind, .. }, .. }) => {
+        (_, naga::TypeInner::Image { class: naga::ImageClass::Sampled { kind, .. }, arrayed, .. }) => {
             wgpu::BindingType::Texture {
                 sample_type: match kind {
                     naga::ScalarKind::Uint => wgpu::TextureSampleType::Uint,
                     _ => wgpu::TextureSampleType::Float { filterable: false },
                 },
-                view_dimension: wgpu::TextureViewDimension::D2,
+                view_dimension: match arrayed {
+                    true => wgpu::TextureViewDimension::D2Array,
+                    false => wgpu::TextureViewDimension::D2,
+                },
                 multisampled: false,
             }
         }

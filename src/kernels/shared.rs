@@ -86,12 +86,12 @@ gpu_struct! {
         height: u32,
         /// +Y axis.
         up: [f32; 3],
-        /// Index of the image's first pixel.
-        first_texel: u32,
+        /// The photo's first row in the banks.
+        first_row: u32,
         /// +Z axis, away from the view.
         back: [f32; 3],
-        /// Padding.
-        unused: u32,
+        /// Pixels that can be drawn.
+        pixel_count: u32,
         /// Focal lengths.
         focal_px: [f32; 2],
         /// Principal point.
@@ -106,9 +106,9 @@ gpu_struct! {
 }
 
 impl Camera {
-    /// `camera` in the space where the scene's box is the unit cube; its pixels start at `first_texel`.
+    /// `camera` in the space where the scene's box is the unit cube, without a photo.
     #[must_use]
-    pub fn in_box(camera: &crate::camera::Camera, bounds: &Bounds, first_texel: u32) -> Self {
+    pub fn in_box(camera: &crate::camera::Camera, bounds: &Bounds) -> Self {
         let pose = camera.world_from_camera;
         let side = 2.0 * bounds.outer_half();
         let axis = |axis: glam::DVec3| axis.normalize_or_zero().as_vec3().to_array();
@@ -122,7 +122,8 @@ impl Camera {
             right: axis(pose.matrix3.x_axis),
             height: camera.height,
             up: axis(pose.matrix3.y_axis),
-            first_texel,
+            first_row: 0,
+            pixel_count: 1,
             back: axis(pose.matrix3.z_axis),
             focal_px: camera.focal_px.as_vec2().to_array(),
             center_px: camera.center_px.as_vec2().to_array(),

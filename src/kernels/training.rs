@@ -45,6 +45,9 @@ pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()>
     for name in ["targets", "backgrounds", "rendered", "ray_errors"] {
         workspace.add(gpu.storage::<[f32; 4]>(name, batch.rays)?);
     }
+    if plan.needs.depth {
+        workspace.add(gpu.storage::<f32>("depth_targets", batch.rays)?);
+    }
     let tensors = [
         ("d_color", Element::Vec4, rows),
         ("d_raw_color", Element::Vec4, rows),
@@ -83,10 +86,12 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
         CAMERA,
         plan.lens(),
         plan.pixels(),
+        plan.position(),
+        plan.depth_target(),
         plan.background(),
         part!("rays.wgsl"),
     ];
-    let kernel = plan.kernel(gpu, "rays", &parts)?;
+    let kernel = plan.generated_kernel(gpu, "rays", &parts, &[], workspace.banks_part()?)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }
 
@@ -96,7 +101,16 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -> Result<Stage> {
     let weights = if weights { part!("weights/stored.wgsl") } else { part!("weights/none.wgsl") };
-    let parts = [COUNTERS, EXP, SUM, plan.transmittance(), weights, part!("composite.wgsl")];
+    let parts = [
+        COUNTERS,
+        EXP,
+        SUM,
+        plan.transmittance(),
+        plan.loss(),
+        plan.depth_loss(),
+        weights,
+        part!("composite.wgsl"),
+    ];
     let kernel = plan.kernel(gpu, "composite", &parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }

@@ -1,16 +1,18 @@
 //! Buffers and tensors by name.
 
 use crate::gpu::Gpu;
+use crate::gpu::banks::Banks;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::kernel::{Bound, Kernel, Resource};
 use crate::gpu::tensor::Tensor;
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 /// Buffers and tensors by name: what kernels are bound to.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
     buffers: Vec<Buffer>,
     tensors: Vec<Tensor>,
+    banks: Option<Banks>,
 }
 
 impl Workspace {
@@ -32,6 +34,19 @@ impl Workspace {
             tensor.name
         );
         self.tensors.push(tensor);
+    }
+
+    /// Adds the banks that hold the training photos.
+    pub fn add_banks(&mut self, banks: Banks) {
+        self.banks = Some(banks);
+    }
+
+    /// The part that reads the banks.
+    ///
+    /// # Errors
+    /// When there are none: only a training has photos.
+    pub fn banks_part(&self) -> Result<String> {
+        Ok(self.banks.as_ref().context("this workspace has no photos")?.part())
     }
 
     /// The buffer `name`.
@@ -105,6 +120,7 @@ impl Workspace {
         }
         resources.extend(self.buffers.iter().map(Buffer::resource));
         resources.extend(self.tensors.iter().map(|tensor| tensor.named(tensor.name)));
+        resources.extend(self.banks.iter().flat_map(Banks::resources));
         kernel.bind(gpu, &resources)
     }
 
@@ -112,6 +128,7 @@ impl Workspace {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let buffers: u64 = self.buffers.iter().map(|buffer| buffer.raw.size()).sum();
-        buffers + self.tensors.iter().map(Tensor::bytes).sum::<u64>()
+        let banks: u64 = self.banks.iter().map(Banks::bytes).sum();
+        buffers + banks + self.tensors.iter().map(Tensor::bytes).sum::<u64>()
     }
 }

@@ -9,9 +9,10 @@
 use glam::DVec3;
 
 use super::activation::{color, color_backward, log_density, log_density_backward};
-use super::composite::{CompositeInput, composite};
+use super::composite::CompositeInput;
 use super::grid::{GridLevel, grid_encode, grid_encode_backward};
 use super::harmonics::harmonics;
+use super::loss::{Loss, composite_with};
 use super::mlp::Mlp;
 use super::{ColorRange, Transmittance};
 
@@ -29,12 +30,14 @@ pub struct Model {
 }
 
 /// What the field's outputs mean and how they are composited.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Objective {
     /// Convention of the transmittance.
     pub transmittance: Transmittance,
     /// Range of the colours.
     pub color_range: ColorRange,
+    /// How errors count.
+    pub loss: Loss,
 }
 
 /// A sample to train on.
@@ -46,6 +49,8 @@ pub struct RaySample {
     pub delta: f64,
     /// Factor of the gradient by log-density, 1 unless light samples were dropped.
     pub gain: f64,
+    /// Distance along the ray, in the unit of its depth.
+    pub distance: f64,
 }
 
 /// A ray to train on.
@@ -59,6 +64,8 @@ pub struct TrainingRay {
     pub target: [f64; 4],
     /// Colour behind the ray.
     pub background: [f64; 3],
+    /// Distance along the ray where something is known to be; 0 where it is not.
+    pub depth: f64,
 }
 
 /// ∂loss/∂parameters, in the parameters' shapes.
@@ -110,8 +117,7 @@ impl Model {
         (s, evaluation.raw_color().map(|raw| color(range, raw)))
     }
 
-    /// Loss `1/(4M) Σ_rays Σ_x (R_x − g_x)²` of the `M` rays, those without samples
-    /// included, and its gradients.
+    /// Loss of the `M` rays, those without samples included, and its gradients; see [`super::loss`].
     pub fn forward_backward(&self, objective: Objective, rays: &[TrainingRay]) -> BatchOutput {
         let mut batch = BatchOutput {
             loss: 0.0,
@@ -125,7 +131,12 @@ impl Model {
         for ray in rays {
             let evaluations: Vec<Evaluation> =
                 (ray.samples.iter()).map(|sample| self.evaluate(sample.position, ray.direction)).collect();
-            let composited = composite(
+            let offsets: Vec<f64> = match ray.depth > 0.0 {
+                true => ray.samples.iter().map(|sample| sample.distance - ray.depth).collect(),
+                false => Vec::new(),
+            };
+            let composited = composite_with(
+                objective.loss,
                 objective.transmittance,
                 &CompositeInput {
                     s: &collect(&evaluations, |e| log_density(e.raw_log_density())),
@@ -137,6 +148,7 @@ impl Model {
                     background: ray.background,
                     rays_in_batch: rays.len() as u32,
                 },
+                &offsets,
             );
             batch.loss += composited.loss;
             batch.rendered.push(composited.rendered);

@@ -4,8 +4,8 @@
 use anyhow::Result;
 use nerf::check::networks::{SHAPES, Shape, networks};
 use nerf::check::{
-    Forced, activation, adam, exponential, fused, grid, harmonics, lens, marching, occupancy, random, rays,
-    selection, step, view,
+    Forced, activation, adam, exponential, fused, grid, harmonics, lens, loss, marching, occupancy, random,
+    rays, selection, step, targets, view,
 };
 use nerf::config::Accumulation;
 use nerf::gpu::tensor::Memory;
@@ -39,7 +39,7 @@ fn view_rays() -> Result<()> {
 
 #[test]
 fn training_rays() -> Result<()> {
-    passes([rays::training_rays(&subject()?)?]);
+    passes([targets::training_rays(&subject()?)?]);
     Ok(())
 }
 
@@ -95,6 +95,12 @@ fn render_loss_and_gradient() -> Result<()> {
 #[test]
 fn adam_on_table_and_networks() -> Result<()> {
     passes(adam::adam(&subject()?)?);
+    Ok(())
+}
+
+#[test]
+fn depth_and_relative_errors() -> Result<()> {
+    passes([loss::depth_and_relative_errors(&subject()?)?]);
     Ok(())
 }
 
@@ -174,6 +180,8 @@ fn tensors_in_buffers() -> Result<()> {
     passes(fused::fused(&subject)?);
     passes(adam::adam(&subject)?);
     passes([occupancy::occupancy_update(&subject)?, view::rendered_views(&subject)?]);
-    passes([step::one_step(&subject, &step::setups()[..1])?]);
+    passes([targets::training_rays(&subject)?, loss::depth_and_relative_errors(&subject)?]);
+    let setups = step::setups();
+    passes([step::one_step(&subject, &[setups[0].clone(), setups[4].clone()])?]);
     Ok(())
 }

@@ -16,7 +16,8 @@ use nerf::dataset::{Dataset, OpenOptions};
 use nerf::gpu::Gpu;
 use nerf::image::Image;
 use nerf::schedule::Budget;
-use nerf::train::{Trainer, Views};
+use nerf::train::Trainer;
+use nerf::views::Views;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -138,8 +139,9 @@ impl Course<'_> {
     fn run(&self, entry: &Entry, session: &Session<'_>) -> Result<Run> {
         let setup = &entry.setup;
         let clock = Instant::now();
-        let views = Views { cameras: &setup.cameras, images: &self.images, bounds: &setup.about.bounds };
-        let mut trainer = Trainer::new(&self.gpu, setup.plan.clone(), &views)?;
+        let mut views = Views::new(&self.gpu, &setup.plan, &setup.cameras, &setup.about.bounds)?;
+        self.images.iter().try_for_each(|image| views.add(&image.clone().into()))?;
+        let mut trainer = Trainer::new(&self.gpu, setup.plan.clone(), views)?;
         trainer.warm_up()?;
         let mut exam = Exam::new(&self.gpu, setup, trainer.workspace(), self.dataset, self.views)?
             .context("the dataset has no test views")?;

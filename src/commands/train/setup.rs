@@ -174,6 +174,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
             hdr: dataset.is_hdr,
             cascades: bounds.cascades,
             cameras: cameras.len(),
+            ..Needs::default()
         },
         splits: Splits { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) },
         image_size: [orbit.width, orbit.height],

@@ -108,9 +108,13 @@ impl Device {
     pub(super) fn upload(&self, rays: &[Samples]) -> Result<()> {
         let training_ray = |ray: &Samples| TrainingRay {
             direction: DVec3::Z,
-            samples: vec![RaySample { position: DVec3::ZERO, delta: ray.delta, gain: 1.0 }; ray.s.len()],
+            samples: vec![
+                RaySample { position: DVec3::ZERO, delta: ray.delta, gain: 1.0, distance: 0.0 };
+                ray.s.len()
+            ],
             target: [0.0; 4],
             background: [0.0; 3],
+            depth: 0.0,
         };
         self.bench.upload(&rays.iter().map(training_ray).collect::<Vec<_>>())?;
         let raw: Vec<f32> = rays.iter().flat_map(|ray| &ray.s).map(|&s| s as f32).collect();

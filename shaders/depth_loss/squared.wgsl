@@ -1,0 +1,63 @@
+// Needs: counters, sum, transmittance, behind_next. Provides: the depth's share of the loss, DEPTH_WEIGHT / M times the
+// square of sum_i w_i (t_i - g) over the rays whose distance g is known. It is a fifth channel whose colour is t_i - g,
+// over 0: what is transparent is left to the other channels. Distances are in sides of the inner cube.
+
+tensor<read> ray_origins: vec4<f32>;
+tensor<read> ray_directions: vec4<f32>;
+tensor<read> samples: vec4<f32>;
+tensor<read> kept_rows: vec2<u32>;
+// 0 where unknown.
+var<storage, read> depth_targets: array<f32>;
+
+struct DepthRay {
+    origin: vec3<f32>,
+    goal: f32,
+    direction: vec3<f32>,
+    unused: f32,
+    // On the way there the channel in x, on the way back what lies behind.
+    sum: Sum,
+    // dL/dR of the channel.
+    d_result: f32,
+}
+
+fn depth_begin(ray: u32) -> DepthRay {
+    let goal = depth_targets[ray];
+    return DepthRay(ray_origins_load(ray).xyz, goal, ray_directions_load(ray).xyz, 0.0, sum_of(vec4(0.0)), 0.0);
+}
+
+// The channel's colour of a sample.
+fn depth_offset(depth: DepthRay, i: u32) -> vec4<f32> {
+    let position = samples_load(kept_rows_load(i).x).xyz;
+    let distance = dot(position - depth.origin, depth.direction) * DENSITY_SCALE;
+    return vec4(select(0.0, distance - depth.goal, depth.goal > 0.0), 0.0, 0.0, 0.0);
+}
+
+fn depth_forward(depth: DepthRay, i: u32, root: f32, alpha: f32, zero: u32) -> DepthRay {
+    var next = depth;
+    next.sum = sum_add(depth.sum, squared_times(root, alpha * depth_offset(depth, i)), zero);
+    return next;
+}
+
+// From the way there to the way back.
+fn depth_turn(depth: DepthRay) -> DepthRay {
+    var next = depth;
+    next.d_result = 2.0 * DEPTH_WEIGHT * depth.sum.value.x / f32(counters.rays_used);
+    next.sum = sum_of(vec4(0.0));
+    return next;
+}
+
+// As a part of a ray's squared errors, of which the loss is a quarter.
+fn depth_squared_error(depth: DepthRay) -> f32 {
+    return 4.0 * DEPTH_WEIGHT * depth.sum.value.x * depth.sum.value.x;
+}
+
+// The channel's part of dL/ds_i, but for tau and T.
+fn depth_gradient(depth: DepthRay, i: u32, alpha: f32) -> f32 {
+    return depth.d_result * gradient_color(alpha, depth_offset(depth, i), depth.sum).x;
+}
+
+fn depth_backward(depth: DepthRay, i: u32, tau: f32, alpha: f32, passing_root: f32, zero: u32) -> DepthRay {
+    var next = depth;
+    next.sum = behind_next(depth.sum, depth_offset(depth, i), tau, alpha, passing_root, zero);
+    return next;
+}

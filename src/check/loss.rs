@@ -1,0 +1,197 @@
+//! The fused kernel with everything that a loss may have: errors relative to the colour, and depth.
+
+use super::draw::Random;
+use super::{Setup, Subject, Tally};
+use crate::config::{ColorLoss, Loss};
+use crate::kernels::{Counters, training};
+use crate::reference::Transmittance;
+use crate::reference::composite::{CompositeInput, CompositeOutput, optical_depths};
+use crate::reference::loss::composite_with;
+use anyhow::Result;
+use std::iter::repeat_n;
+
+/// Smaller gradients may vanish in single precision.
+const LEAST: f64 = 1e-30;
+
+/// A ray whose distances are known.
+struct Ray {
+    s: Vec<f64>,
+    delta: Vec<f64>,
+    color: Vec<[f64; 3]>,
+    /// Distances of the samples, and of what is known to be there; 0 where nothing is.
+    distances: Vec<f64>,
+    goal: f64,
+    target: [f64; 4],
+    background: [f64; 3],
+}
+
+/// Loss and gradients of rays of 0 to 60 samples, from transparent to opaque, in both conventions.
+///
+/// # Errors
+/// When the device was lost or refuses the kernel.
+pub fn depth_and_relative_errors(subject: &Subject) -> Result<Tally> {
+    let mut tally =
+        Tally::new("depth and relative errors", 2e-5, "T = e^-depth, and distances of up to 4 round");
+    for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
+        let mut setup = Setup::tiny().transmittance(convention);
+        setup.config.loss = Loss { color: ColorLoss::Relative, depth: 0.3 };
+        setup.needs.depth = true;
+        (setup.config.batch.kept, setup.config.batch.samples) = (8192, 8192);
+        let bench = subject.workbench(setup)?;
+        let mut random = Random::new(73);
+        let rays: Vec<_> = (0..200).map(|number| Ray::new(&mut random, number)).collect();
+        let mut first = 0;
+        let spans: Vec<[u32; 2]> = (rays.iter())
+            .map(|ray| {
+                let span = [first, ray.s.len() as u32];
+                first += span[1];
+                span
+            })
+            .collect();
+        upload(&bench, &rays, &spans);
+        bench.run([&training::composite(&bench.gpu, &bench.plan, &bench.workspace, true)?])?;
+        let gradients: Vec<[f32; 4]> = bench.read("d_color", first as usize)?;
+        let errors: Vec<[f32; 4]> = bench.read("ray_errors", rays.len())?;
+        for (number, (ray, [first, count])) in rays.iter().zip(spans).enumerate() {
+            let range = first as usize..(first + count) as usize;
+            ray.compare(&mut tally, &bench.objective(), &gradients[range], errors[number], number);
+        }
+    }
+    Ok(tally)
+}
+
+fn upload(bench: &super::Workbench, rays: &[Ray], spans: &[[u32; 2]]) {
+    let all = |value: fn(&Ray) -> Vec<[f32; 4]>| rays.iter().flat_map(value).collect::<Vec<_>>();
+    let steps: Vec<[f32; 2]> = rays
+        .iter()
+        .flat_map(|ray| ray.s.iter().zip(&ray.delta))
+        .map(|(&s, &d)| [s as f32, d as f32])
+        .collect();
+    bench.set_kept_steps(&steps);
+    bench.write("color", &all(|ray| ray.color.iter().map(|c| narrow([c[0], c[1], c[2], 0.0])).collect()));
+    // All rays go along x; a sample's row is its own number.
+    bench.write("samples", &all(|ray| ray.distances.iter().map(|&t| [t as f32, 0.0, 0.0, 0.0]).collect()));
+    let rows: Vec<[u32; 2]> = spans
+        .iter()
+        .zip(0..)
+        .flat_map(|(span, ray)| repeat_n(ray, span[1] as usize))
+        .zip(0..)
+        .map(|(ray, row)| [row, ray])
+        .collect();
+    bench.write("kept_rows", &rows);
+    bench.write("ray_origins", &vec![[0.0_f32; 4]; rays.len()]);
+    bench.write("ray_directions", &vec![[1.0_f32, 0.0, 0.0, 0.0]; rays.len()]);
+    bench.write("depth_targets", &rays.iter().map(|ray| ray.goal as f32).collect::<Vec<_>>());
+    bench.write("targets", &rays.iter().map(|ray| narrow(ray.target)).collect::<Vec<_>>());
+    let behind = |ray: &Ray| narrow([ray.background[0], ray.background[1], ray.background[2], 0.0]);
+    bench.write("backgrounds", &rays.iter().map(behind).collect::<Vec<_>>());
+    bench.write("kept_spans", spans);
+    let (count, kept) = (rays.len() as u32, rows.len() as u32);
+    bench.set_counters(Counters { rays: count, rays_used: count, kept, ..Counters::default() });
+}
+
+fn narrow(values: [f64; 4]) -> [f32; 4] {
+    values.map(|value| value as f32)
+}
+
+impl Ray {
+    fn new(random: &mut Random, number: usize) -> Self {
+        let count = number * 7 % 61;
+        let mut numbers = |low: f64, high: f64| -> Vec<f64> {
+            random.numbers(count, low, high).into_iter().map(f64::from).collect()
+        };
+        let (s, delta) = (numbers(-6.0, 5.0), numbers(0.01, 0.2));
+        let channels = [numbers(0.0, 20.0), numbers(0.0, 1.0), numbers(0.0, 0.05)];
+        let mut distances = numbers(0.1, 4.0);
+        distances.sort_by(f64::total_cmp);
+        let color = (0..count).map(|i| channels.each_ref().map(|channel| channel[i])).collect();
+        let mut number_in = |low: f64, high: f64| f64::from(random.number(low, high) as f32);
+        Self {
+            s,
+            delta,
+            color,
+            distances,
+            goal: if number % 4 == 3 { 0.0 } else { number_in(0.1, 4.0) },
+            target: std::array::from_fn(|x| number_in(0.0, [20.0, 1.0, 0.05, 1.0][x])),
+            background: std::array::from_fn(|_| number_in(0.0, 1.0)),
+        }
+    }
+
+    fn compare(
+        &self,
+        tally: &mut Tally,
+        objective: &crate::reference::model::Objective,
+        gradients: &[[f32; 4]],
+        errors: [f32; 4],
+        number: usize,
+    ) {
+        let input = CompositeInput {
+            s: &self.s,
+            delta: &self.delta,
+            color: &self.color,
+            target: self.target,
+            background: self.background,
+            rays_in_batch: 200,
+        };
+        let offsets: Vec<f64> = match self.goal > 0.0 {
+            true => self.distances.iter().map(|t| t - self.goal).collect(),
+            false => Vec::new(),
+        };
+        let want = composite_with(objective.loss, objective.transmittance, &input, &offsets);
+        let scales = Scales::new(objective, &input, &want, &offsets);
+        let case = |what: &str| format!("ray {number}, {what}");
+        for (x, &error) in errors.iter().enumerate().take(3) {
+            let weight = objective.loss.weights(want.rendered)[x];
+            let size = (want.rendered[x].abs() + self.target[x].abs()).powi(2) * weight;
+            tally.value(error.into(), want.loss_terms[x], size, || case("squared error"));
+        }
+        let loss = errors.iter().map(|&error| f64::from(error)).sum::<f64>() / (4.0 * 200.0);
+        tally.value(loss, want.loss, scales.loss, || case("loss"));
+        for (i, got) in gradients.iter().enumerate() {
+            for x in 0..3 {
+                let scale = (scales.residual[x] * want.weights[i]).max(LEAST);
+                tally.value(got[x].into(), want.d_color[i][x], scale, || case("by colour"));
+            }
+            tally.value(got[3].into(), want.d_s[i], scales.d_s[i].max(LEAST), || case("by log-density"));
+        }
+    }
+}
+
+/// Sizes of the terms that values are summed from.
+struct Scales {
+    /// `v_x (|R_x| + |g_x|)/(2M)`.
+    residual: [f64; 4],
+    loss: f64,
+    d_s: Vec<f64>,
+}
+
+impl Scales {
+    fn new(
+        objective: &crate::reference::model::Objective,
+        ray: &CompositeInput<'_>,
+        output: &CompositeOutput,
+        offsets: &[f64],
+    ) -> Self {
+        let m = f64::from(ray.rays_in_batch);
+        let weights = objective.loss.weights(output.rendered);
+        let both = |x: usize| output.rendered[x].abs() + ray.target[x].abs();
+        let residual: [f64; 4] = std::array::from_fn(|x| weights[x] * both(x) / (2.0 * m));
+        let size_of_depth: f64 = output.weights.iter().zip(offsets).map(|(w, offset)| w * offset.abs()).sum();
+        let share = objective.loss.depth / m;
+        let loss = (0..4).map(|x| residual[x] * both(x) / 2.0).sum::<f64>() + share * size_of_depth.powi(2);
+        let depths = optical_depths(ray);
+        let mut behind = [ray.background[0], ray.background[1], ray.background[2], 0.0, 0.0]
+            .map(|background| output.transmittance_end * background);
+        let mut d_s = vec![0.0; depths.len()];
+        for i in (0..depths.len()).rev() {
+            let [r, g, b] = ray.color[i];
+            let channels = [r, g, b, 1.0, offsets.get(i).copied().unwrap_or(0.0)];
+            let passing = (-depths[..=i].iter().sum::<f64>()).exp();
+            let term = |x: usize| behind[x] + (passing + output.weights[i]) * channels[x].abs();
+            let by_color: f64 = (0..4).map(|x| residual[x] * term(x)).sum();
+            d_s[i] = depths[i] * (by_color + 2.0 * share * size_of_depth * term(4));
+            (0..5).for_each(|x| behind[x] += output.weights[i] * channels[x].abs());
+        }
+        Self { residual, loss, d_s }
+    }
+}

@@ -1,0 +1,157 @@
+//! What is minimised over a ray: errors of colour and opacity with their weights, and of the depth.
+//!
+//! ```text
+//! loss = 1/(4M) Σ_x v_x (R_x − g_x)²  +  λ/M D²        D = Σ_i w_i (t_i − g_t)
+//! v_x = 1                     squared, and always for the opacity
+//! v_x = 1 / (R_x² + 0.01)     relative; a constant as far as gradients go (Mildenhall et al. 2022, eq. 4)
+//! d_c_xi = v_x (R_x − g_x)/(2M) w_i
+//! d_s_i  = Σ_x v_x (R_x − g_x)/(2M) dR_x/ds_i  +  2λ/M D dD/ds_i
+//! ```
+//!
+//! `D` is composited like a colour `t_i − g_t` over 0, so that the transparent part of a ray has no error, and its
+//! derivative is that of a colour.
+
+use super::Transmittance;
+use super::composite::{CompositeInput, CompositeOutput, composite, d_rendered_by_s};
+
+/// Added to the square of the colour that an error is relative to.
+pub const RELATIVE_FLOOR: f64 = 0.01;
+
+/// How errors count.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Loss {
+    /// Whether errors of the colour count relative to the colour.
+    pub is_relative: bool,
+    /// `λ`, the weight of the depth's squared error.
+    pub depth: f64,
+}
+
+impl Loss {
+    /// `v_x` of colour and opacity.
+    pub fn weights(&self, rendered: [f64; 4]) -> [f64; 4] {
+        let weight = |x: usize| match self.is_relative && x < 3 {
+            true => 1.0 / (rendered[x] * rendered[x] + RELATIVE_FLOOR),
+            false => 1.0,
+        };
+        std::array::from_fn(weight)
+    }
+}
+
+/// Composites a ray whose samples lie `offsets` behind the known depth, `t_i − g_t`; without offsets the depth is
+/// not known. The loss terms are those of the colour and the opacity, with their weights.
+pub fn composite_with(
+    loss: Loss,
+    convention: Transmittance,
+    ray: &CompositeInput,
+    offsets: &[f64],
+) -> CompositeOutput {
+    let mut output = composite(convention, ray);
+    let m = f64::from(ray.rays_in_batch.max(1));
+    let weights = loss.weights(output.rendered);
+    let residual: [f64; 4] = std::array::from_fn(|x| output.rendered[x] - ray.target[x]);
+    output.loss_terms = std::array::from_fn(|x| weights[x] * residual[x] * residual[x]);
+    output.loss = output.loss_terms.iter().sum::<f64>() / (4.0 * m);
+    let d_rendered: [f64; 4] = std::array::from_fn(|x| weights[x] * residual[x] / (2.0 * m));
+    let w = &output.weights;
+    output.d_color = w.iter().map(|w| std::array::from_fn(|x| d_rendered[x] * w)).collect();
+    let by_s = d_rendered_by_s(convention, ray);
+    output.d_s = by_s.iter().map(|by_s| (0..4).map(|x| d_rendered[x] * by_s[x]).sum()).collect();
+    if !offsets.is_empty() {
+        add_depth(loss.depth / m, convention, ray, offsets, &mut output);
+    }
+    output
+}
+
+/// Adds what the depth has of the loss and of the gradient by log-density; `share` is `λ/M`.
+fn add_depth(
+    share: f64,
+    convention: Transmittance,
+    ray: &CompositeInput,
+    offsets: &[f64],
+    output: &mut CompositeOutput,
+) {
+    let depth: f64 = output.weights.iter().zip(offsets).map(|(w, offset)| w * offset).sum();
+    output.loss += share * depth * depth;
+    let color: Vec<_> = offsets.iter().map(|&offset| [offset, 0.0, 0.0]).collect();
+    let channel = CompositeInput { color: &color, background: [0.0; 3], ..*ray };
+    for (d_s, by_s) in output.d_s.iter_mut().zip(d_rendered_by_s(convention, &channel)) {
+        *d_s += 2.0 * share * depth * by_s[0];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RAY: CompositeInput = CompositeInput {
+        s: &[0.3, 1.2, -0.4],
+        delta: &[0.5, 0.25, 1.0],
+        color: &[[0.2, 3.0, 0.5], [0.9, 0.1, 7.0], [0.4, 0.4, 0.0]],
+        target: [0.5, 2.0, 4.0, 1.0],
+        background: [0.1, 0.2, 0.3],
+        rays_in_batch: 3,
+    };
+
+    #[test]
+    fn plainly_it_is_what_compositing_says() {
+        for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
+            assert_eq!(composite_with(Loss::default(), convention, &RAY, &[]), composite(convention, &RAY));
+        }
+    }
+
+    /// The loss with the weights that the undisturbed ray has.
+    fn loss_at(loss: Loss, weights: [f64; 4], convention: Transmittance, ray: &CompositeInput) -> f64 {
+        let plain = composite(convention, ray);
+        let m = f64::from(ray.rays_in_batch);
+        let terms = (0..4).map(|x| weights[x] * (plain.rendered[x] - ray.target[x]).powi(2));
+        let depth: f64 = plain.weights.iter().zip(OFFSETS).map(|(w, offset)| w * offset).sum();
+        terms.sum::<f64>() / (4.0 * m) + loss.depth / m * depth * depth
+    }
+
+    const OFFSETS: [f64; 3] = [-0.3, 0.1, 0.8];
+
+    #[test]
+    fn gradients_are_slopes() {
+        let loss = Loss { is_relative: true, depth: 0.7 };
+        for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
+            let output = composite_with(loss, convention, &RAY, &OFFSETS);
+            let weights = loss.weights(output.rendered);
+            assert!((output.loss - loss_at(loss, weights, convention, &RAY)).abs() < 1e-12);
+            for i in 0..3 {
+                let at = |h: f64| {
+                    let mut s = RAY.s.to_vec();
+                    s[i] += h;
+                    loss_at(loss, weights, convention, &CompositeInput { s: &s, ..RAY })
+                };
+                let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+                assert!((slope - output.d_s[i]).abs() < 1e-9, "{slope} {}", output.d_s[i]);
+                for x in 0..3 {
+                    let at = |h: f64| {
+                        let mut color = RAY.color.to_vec();
+                        color[i][x] += h;
+                        loss_at(loss, weights, convention, &CompositeInput { color: &color, ..RAY })
+                    };
+                    let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+                    assert!((slope - output.d_color[i][x]).abs() < 1e-9, "{slope}");
+                }
+            }
+        }
+    }
+
+    /// One opaque sample at a distance of 0.2 behind the goal: D = 0.2; what is transparent has no error.
+    #[test]
+    fn only_what_is_there_has_a_depth() {
+        let loss = Loss { is_relative: false, depth: 2.0 };
+        let ray = |s: &'static [f64]| CompositeInput {
+            s,
+            delta: &[1.0],
+            color: &[[1.0; 3]],
+            target: [1.0; 4],
+            background: [1.0; 3],
+            rays_in_batch: 1,
+        };
+        let of = |s| composite_with(loss, Transmittance::Exclusive, &ray(s), &[0.2]);
+        assert!((of(&[10.0]).loss - 2.0 * 0.04).abs() < 1e-12);
+        assert!((of(&[-50.0]).loss - 0.25).abs() < 1e-12);
+    }
+}
