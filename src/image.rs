@@ -74,6 +74,15 @@ impl Image {
         }
     }
 
+    /// Geometric mean of the brightest channel over the pixels that are not black or transparent; `None` where all are.
+    pub fn brightness(&self) -> Option<f64> {
+        let Pixels::Linear(pixels) = &self.pixels else { return Some(1.0) };
+        let brightest = pixels.iter().map(|&[r, g, b, alpha]| (r.max(g).max(b), alpha));
+        let lit = brightest.filter(|(value, alpha)| *value > 0.0 && *alpha > 0.5);
+        let logs: Vec<f64> = lit.map(|(value, alpha)| f64::from(value / alpha).ln()).collect();
+        (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
+    }
+
     fn load_srgb(path: &Path, format: ImageFormat) -> Result<Self> {
         let decoded = open_srgb(path, format)?.decode()?;
         let has_alpha = decoded.color().has_alpha();

@@ -37,6 +37,8 @@ pub struct Renderer {
     stages: Vec<Stage>,
     bounds: Bounds,
     lens: bool,
+    /// Scene-linear brightness of a field colour of 1.
+    grey: f32,
     rays: u32,
 }
 
@@ -64,7 +66,8 @@ impl Renderer {
         stages.extend(density::stages(gpu, &plan, &workspace)?);
         stages.extend(color::stages(gpu, &plan, &workspace, color::Selection::All)?);
         stages.push(viewing::composite(gpu, &plan, &workspace)?);
-        Ok(Self { gpu: Arc::clone(gpu), workspace, stages, bounds: bounds.clone(), lens, rays: 1024 })
+        let (bounds, grey) = (bounds.clone(), plan.needs.grey);
+        Ok(Self { gpu: Arc::clone(gpu), workspace, stages, bounds, lens, grey, rays: 1024 })
     }
 
     /// Renders what `camera` sees.
@@ -86,6 +89,7 @@ impl Renderer {
             color.extend(self.gpu.read::<[f32; 4]>(self.workspace.get("view_color"), 0, used)?);
             depth.extend(self.gpu.read::<f32>(self.workspace.get("view_depth"), 0, used)?);
         }
+        color.iter_mut().flat_map(|pixel| &mut pixel[..3]).for_each(|value| *value *= self.grey);
         let world_per_box = (self.bounds.outer_half() * 2.0) as f32;
         depth.iter_mut().for_each(|z| *z *= world_per_box);
         Ok(View { width: camera.width, height: camera.height, color, depth })

@@ -45,7 +45,7 @@ pub struct StepStats {
     pub skipped: u32,
     /// Mean loss of the other steps.
     pub loss: f64,
-    /// Mean squared error of the colour.
+    /// Mean squared error of the colour, relative to the colour where the loss is.
     pub color_error: f64,
 }
 

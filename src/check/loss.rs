@@ -148,10 +148,8 @@ impl Ray {
         let loss = errors.iter().map(|&error| f64::from(error)).sum::<f64>() / (4.0 * 200.0);
         tally.value(loss, want.loss, scales.loss, || case("loss"));
         for (i, got) in gradients.iter().enumerate() {
-            for x in 0..3 {
-                let scale = (scales.residual[x] * want.weights[i]).max(LEAST);
-                tally.value(got[x].into(), want.d_color[i][x], scale, || case("by colour"));
-            }
+            let scale = |x: usize| (scales.residual[x] * want.weights[i]).max(LEAST);
+            tally.each(&case("by colour"), &got[..3], &want.d_color[i], scale);
             tally.value(got[3].into(), want.d_s[i], scales.d_s[i].max(LEAST), || case("by log-density"));
         }
     }

@@ -171,7 +171,7 @@ mod tests {
         let photo = photo(Pixels::Srgb8(vec![[255; 4], [1, 2, 3, 4]]), vec![true, false], vec![1.0, 3.0]);
         let record = Record { color: 2, has_position: true, has_depth: true };
         let words = record.of(&photo, UNITS).expect("of its kind");
-        let wide = |low: u32, high: u32| low * 257 | (high * 257) << 16;
+        let wide = |low: u32, high: u32| (low * 257) | ((high * 257) << 16);
         assert_eq!(*words, [wide(1, 2), wide(3, 4), 1, 6.0f32.to_bits()]);
     }
 

@@ -106,7 +106,8 @@ impl<'a> Course<'a> {
     /// Logs a block and shows how far the training is.
     fn record(&mut self, block: &Block, progress: &Progress) -> Result<()> {
         let (step, seconds, stats) = (self.pace.steps(), self.pace.seconds(), &block.stats);
-        let psnr = (-10.0 * stats.color_error.log10()).min(PSNR_CAP_DB);
+        let is_relative = self.pace.trainer.plan().has_relative_loss();
+        let psnr = (!is_relative).then(|| (-10.0 * stats.color_error.log10()).min(PSNR_CAP_DB));
         self.loss = Some([self.loss.map_or(stats.loss, |[first, _]| first), stats.loss]);
         if stats.samples == 0 && !self.is_empty {
             progress.say(&format!(
@@ -139,8 +140,12 @@ impl<'a> Course<'a> {
             let earlier = self.about.budget.spent(self.start.0, self.start.1);
             let remaining = (seconds - self.start.1) * (1.0 - spent) / (spent - earlier).max(1e-9);
             format!(
-                "step {step}, loss {:.5}, PSNR {psnr:.2} dB, {} rays/s, {} samples/s, {}, {} to go",
+                "step {step}, loss {:.5}, {}, {} rays/s, {} samples/s, {}, {} to go",
                 stats.loss,
+                psnr.map_or_else(
+                    || format!("relative error {:.1} %", 100.0 * stats.color_error.sqrt()),
+                    |psnr| format!("PSNR {psnr:.2} dB")
+                ),
                 per_second(stats.rays),
                 per_second(stats.samples),
                 duration(seconds),
