@@ -5,6 +5,7 @@
 pub mod adapter;
 pub mod banks;
 pub mod buffer;
+pub mod demand;
 pub mod kernel;
 pub mod pass;
 pub mod source;

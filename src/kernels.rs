@@ -15,6 +15,7 @@ pub mod color;
 pub mod density;
 pub mod layer;
 pub mod marching;
+mod memory;
 pub mod occupancy;
 pub mod photos;
 mod shared;
@@ -29,7 +30,7 @@ use crate::config::{Accumulation, Background, ColorLoss, Config, Transmittance};
 use crate::gpu::Gpu;
 use crate::gpu::kernel::{Kernel, Shared};
 use crate::gpu::source::Source;
-use crate::gpu::tensor::{Element, Memory};
+use crate::gpu::tensor::Memory;
 use crate::model::{DENSITY_OUTPUTS, Layout, Level};
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
@@ -374,19 +375,6 @@ impl Plan {
                 [vec![part!("scatter_ordered.wgsl")], vec![part!("gradient/take_ordered.wgsl")]]
             }
         }
-    }
-
-    /// Adds a tensor to `workspace`.
-    fn allocate(
-        &self,
-        gpu: &Gpu,
-        workspace: &mut Workspace,
-        list: &[(&'static str, Element, usize)],
-    ) -> Result<()> {
-        for &(name, element, count) in list {
-            workspace.add_tensor(gpu.tensor(name, element, count, self.memory)?);
-        }
-        Ok(())
     }
 }
 

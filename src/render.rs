@@ -3,6 +3,7 @@
 use crate::camera::{Camera, Lens};
 use crate::dataset::Bounds;
 use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
 use crate::kernels::{self, Counters, Plan, Step, Workspace, color, density, marching, viewing};
 use anyhow::{Result, bail};
@@ -48,19 +49,13 @@ impl Renderer {
     /// # Errors
     /// When the adapter cannot hold a chunk or refuses a kernel.
     pub fn new(gpu: &Arc<Gpu>, plan: &Plan, field: &Workspace, bounds: &Bounds, lens: bool) -> Result<Self> {
-        let mut plan = plan.clone();
+        let mut plan = chunk_plan(plan);
         plan.needs.lens = lens;
-        plan.config.batch.samples = SAMPLES.max(plan.config.march.most_steps);
-        plan.config.batch.kept = plan.config.batch.samples;
-        plan.config.batch.rays = RAYS;
         let mut workspace = Workspace::default();
         for name in PARAMETERS {
             workspace.share(field, name);
         }
-        marching::allocate(gpu, &plan, &mut workspace)?;
-        density::allocate(gpu, &plan, &mut workspace)?;
-        color::allocate(gpu, &plan, &mut workspace)?;
-        viewing::allocate(gpu, &plan, &mut workspace)?;
+        workspace.allocate(gpu, &plan.viewing_demands())?;
         let mut stages = vec![viewing::rays(gpu, &plan, &workspace)?];
         stages.extend(marching::stages(gpu, &plan, &workspace, false)?);
         stages.extend(density::stages(gpu, &plan, &workspace)?);
@@ -68,6 +63,12 @@ impl Renderer {
         stages.push(viewing::composite(gpu, &plan, &workspace)?);
         let (bounds, grey) = (bounds.clone(), plan.needs.grey);
         Ok(Self { gpu: Arc::clone(gpu), workspace, stages, bounds, lens, grey, rays: 1024 })
+    }
+
+    /// Bytes on the device that a renderer of `plan` takes besides the parameters.
+    #[must_use]
+    pub fn bytes(plan: &Plan) -> u64 {
+        chunk_plan(plan).viewing_demands().iter().map(Demand::bytes).sum()
     }
 
     /// Renders what `camera` sees.
@@ -115,4 +116,13 @@ impl Renderer {
         self.rays = fit.clamp(64.0, RAYS as f64) as u32;
         Ok(used)
     }
+}
+
+/// The plan of a renderer: every sample of a chunk gets colour.
+fn chunk_plan(plan: &Plan) -> Plan {
+    let mut plan = plan.clone();
+    plan.config.batch.samples = SAMPLES.max(plan.config.march.most_steps);
+    plan.config.batch.kept = plan.config.batch.samples;
+    plan.config.batch.rays = RAYS;
+    plan
 }

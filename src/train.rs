@@ -71,17 +71,11 @@ impl Trainer {
         views.check()?;
         // Photos of which nothing can be drawn are never chosen.
         plan.needs.cameras = views.on_device.len();
-        let mut workspace = Workspace::default();
-        marching::allocate(gpu, &plan, &mut workspace)?;
-        density::allocate_parameters(gpu, &plan, &mut workspace)?;
-        density::allocate(gpu, &plan, &mut workspace)?;
-        color::allocate(gpu, &plan, &mut workspace)?;
-        training::allocate(gpu, &plan, &mut workspace)?;
         let hidden =
             hidden_cells(&views.cameras, &views.silhouettes, &views.bounds, plan.config.occupancy.cells);
         let visible: Vec<u32> =
             (0..).zip(&hidden).filter(|(_, hidden)| !**hidden).map(|(cell, _)| cell).collect();
-        occupancy::allocate(gpu, &mut workspace, &visible)?;
+        let mut workspace = Workspace::for_training(gpu, &plan, &visible)?;
         workspace.add(gpu.storage_with("cameras", &views.on_device)?);
         workspace.add_banks(views.banks);
         let stages = step_stages(gpu, &plan, &workspace)?;

@@ -105,7 +105,7 @@ pub fn view_rays(subject: &Subject) -> Result<Vec<Tally>> {
         let mut setup = Setup::tiny();
         setup.needs.lens = linked;
         let mut bench = subject.workbench(setup)?;
-        viewing::allocate(&bench.gpu, &bench.plan, &mut bench.workspace)?;
+        bench.workspace.allocate(&bench.gpu, &viewing::demands(&bench.plan))?;
         let stage = viewing::rays(&bench.gpu, &bench.plan, &bench.workspace)?;
         for (name, lens) in LENSES.into_iter().filter(|(_, lens)| linked == (*lens != Lens::Pinhole)) {
             let camera = camera(&mut random, (17, 13), lens);

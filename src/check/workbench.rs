@@ -5,9 +5,7 @@ use super::draw::quiet_step;
 use crate::gpu::Gpu;
 use crate::gpu::banks::{Banks, Capacity, rows_of};
 use crate::gpu::pass::Stage;
-use crate::kernels::{
-    Counters, Plan, Step, Workspace, color, density, dispatch, marching, occupancy, photos, training,
-};
+use crate::kernels::{Counters, Plan, Step, Workspace, color, density, dispatch, marching, photos, training};
 use crate::model::DENSITY_OUTPUTS;
 use crate::reference::model::TrainingRay;
 use anyhow::{Context, Result, ensure};
@@ -287,13 +285,7 @@ pub fn visible_cells(plan: &Plan) -> Vec<u32> {
 }
 
 fn allocate(gpu: &Gpu, plan: &Plan) -> Result<Workspace> {
-    let mut workspace = Workspace::default();
-    marching::allocate(gpu, plan, &mut workspace)?;
-    density::allocate_parameters(gpu, plan, &mut workspace)?;
-    density::allocate(gpu, plan, &mut workspace)?;
-    color::allocate(gpu, plan, &mut workspace)?;
-    training::allocate(gpu, plan, &mut workspace)?;
-    occupancy::allocate(gpu, &mut workspace, &visible_cells(plan))?;
+    let mut workspace = Workspace::for_training(gpu, plan, &visible_cells(plan))?;
     workspace.add(gpu.storage::<f32>("weights", plan.config.batch.samples)?);
     Ok(workspace)
 }

@@ -23,22 +23,6 @@ impl Gpu {
         self.buffer(name, (count * size_of::<T>()) as u64, Usage::STORAGE)
     }
 
-    /// A zeroed buffer that kernels read as uniform and write as storage.
-    ///
-    /// # Errors
-    /// As [`Gpu::storage`].
-    pub fn uniform_storage<T>(&self, name: &'static str, count: usize) -> Result<Buffer> {
-        self.buffer(name, (count * size_of::<T>()) as u64, Usage::STORAGE | Usage::UNIFORM)
-    }
-
-    /// A storage buffer that also holds the sizes of indirect dispatches.
-    ///
-    /// # Errors
-    /// As [`Gpu::storage`].
-    pub fn indirect(&self, name: &'static str, count: usize) -> Result<Buffer> {
-        self.buffer(name, (count * size_of::<u32>()) as u64, Usage::STORAGE | Usage::INDIRECT)
-    }
-
     /// A uniform buffer of one `T`.
     ///
     /// # Errors
@@ -59,7 +43,7 @@ impl Gpu {
         Ok(buffer)
     }
 
-    fn buffer(&self, name: &'static str, bytes: u64, usage: Usage) -> Result<Buffer> {
+    pub(super) fn buffer(&self, name: &'static str, bytes: u64, usage: Usage) -> Result<Buffer> {
         let limits = self.device.limits();
         let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         if bytes > most {

@@ -4,6 +4,7 @@ use super::density::{forward, layer_stage};
 use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
 use super::{COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, Plan, RANDOM, STEP, Workspace, dispatch};
 use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
 use crate::gpu::pass::{Size, Stage};
 use crate::gpu::tensor::Element;
 use crate::model::COLOR_INPUTS;
@@ -21,23 +22,18 @@ pub enum Selection {
     All,
 }
 
-/// Allocates the kept samples and the colour network's activations.
-///
-/// # Errors
-/// When the adapter cannot hold them.
-pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+/// The kept samples and the colour network's activations.
+pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     let rows = kept_capacity(&plan.config.batch) + SPARE_ROWS;
-    let width = plan.config.network.width;
-    let tensors = [
-        ("chosen", Element::Pair, plan.config.batch.samples),
-        ("kept_rows", Element::Pair, rows),
-        ("kept_steps", Element::Vec4, rows),
-        ("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
-        ("color", Element::Vec4, rows),
+    let mut demands = vec![
+        plan.tensor("chosen", Element::Pair, plan.config.batch.samples),
+        plan.tensor("kept_rows", Element::Pair, rows),
+        plan.tensor("kept_steps", Element::Vec4, rows),
+        plan.tensor("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
+        plan.tensor("color", Element::Vec4, rows),
     ];
-    plan.allocate(gpu, workspace, &tensors)?;
-    let hidden = COLOR_HIDDEN.map(|name| (name, Element::Vec4, rows * width / 4));
-    plan.allocate(gpu, workspace, &hidden[..plan.config.network.color_layers])
+    demands.extend(plan.color_hidden(&COLOR_HIDDEN, rows));
+    demands
 }
 
 /// Selects, packs and colours.

@@ -4,41 +4,42 @@ use super::marching::SPARE_ROWS;
 use super::{COUNT_SAMPLES, COUNTERS, GRID, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
+use crate::gpu::demand::Demand;
 use crate::gpu::kernel::{Kernel, Resource};
 use crate::gpu::pass::{Size, Stage};
 use crate::gpu::tensor::Element;
-use crate::model::{DENSITY_OUTPUTS, Layer};
+use crate::model::{DENSITY_OUTPUTS, Layer, Level};
 use anyhow::Result;
 
-/// Allocates the activations of the marched samples.
-///
-/// # Errors
-/// When the adapter cannot hold them.
-pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+/// The activations of the marched samples.
+pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     let rows = plan.config.batch.samples + SPARE_ROWS;
-    let tensors = [
-        ("encoding", Element::Vec4, rows * plan.layout.encoding() / 4),
-        ("density_hidden", Element::Vec4, rows * plan.config.network.width / 4),
-        ("density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
-    ];
-    plan.allocate(gpu, workspace, &tensors)
+    vec![
+        plan.tensor("encoding", Element::Vec4, rows * plan.layout.encoding() / 4),
+        plan.tensor("density_hidden", Element::Vec4, rows * plan.config.network.width / 4),
+        plan.tensor("density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
+    ]
 }
 
-/// Allocates the parameters: table, weights and the levels' description.
+/// The parameters: table, weights, occupancy and the levels' description.
+pub(super) fn parameter_demands(plan: &Plan) -> Vec<Demand> {
+    vec![
+        Demand::uniform_storage::<Level>("levels", plan.layout.levels.len()),
+        Demand::uniform_storage::<[f32; 4]>("mlp", plan.layout.quads),
+        Demand::storage::<f32>("occupancy", plan.cell_count()),
+        plan.tensor("table", Element::Vec2, plan.layout.entries),
+        plan.tensor("occupancy_bits", Element::Word, plan.cell_count() / 32),
+    ]
+}
+
+/// Allocates the parameters and describes the levels.
 ///
 /// # Errors
 /// When the adapter cannot hold them.
 pub fn allocate_parameters(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
-    let levels = gpu.uniform_storage::<crate::model::Level>("levels", plan.layout.levels.len())?;
-    gpu.write(&levels, 0, &plan.layout.levels);
-    workspace.add(levels);
-    workspace.add(gpu.uniform_storage::<[f32; 4]>("mlp", plan.layout.quads)?);
-    workspace.add(gpu.storage::<f32>("occupancy", plan.cell_count())?);
-    let tensors = [
-        ("table", Element::Vec2, plan.layout.entries),
-        ("occupancy_bits", Element::Word, plan.cell_count() / 32),
-    ];
-    plan.allocate(gpu, workspace, &tensors)
+    workspace.allocate(gpu, &parameter_demands(plan))?;
+    workspace.write(gpu, "levels", &plan.layout.levels);
+    Ok(())
 }
 
 /// Encodes the samples and runs the density network on them.

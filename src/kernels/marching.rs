@@ -5,6 +5,7 @@ use super::{
 };
 use crate::config::Batch;
 use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
@@ -12,24 +13,20 @@ use anyhow::Result;
 /// Room behind the last sample for the rows that the last thread of a matrix product computes in vain.
 pub const SPARE_ROWS: usize = 1024;
 
-/// Allocates rays, their spans and the samples.
-///
-/// # Errors
-/// When the adapter cannot hold them.
-pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+/// Rays, their spans and the samples.
+pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     let batch = &plan.config.batch;
-    workspace.add(gpu.uniform("step", &Step::default())?);
-    workspace.add(gpu.storage::<Counters>("counters", 1)?);
-    workspace.add(gpu.indirect("dispatch", dispatch::COUNT * 4)?);
-    workspace.add(gpu.storage::<u32>("ray_steps", batch.rays * plan.step_words())?);
-    workspace.add(gpu.storage::<[u32; 2]>("ray_spans", batch.rays)?);
-    workspace.add(gpu.storage::<[u32; 2]>("kept_spans", batch.rays)?);
-    let tensors = [
-        ("ray_origins", Element::Vec4, batch.rays),
-        ("ray_directions", Element::Vec4, batch.rays),
-        ("samples", Element::Vec4, batch.samples + SPARE_ROWS),
-    ];
-    plan.allocate(gpu, workspace, &tensors)
+    vec![
+        Demand::uniform::<Step>("step"),
+        Demand::storage::<Counters>("counters", 1),
+        Demand::indirect("dispatch", dispatch::COUNT * 4),
+        Demand::storage::<u32>("ray_steps", batch.rays * plan.step_words()),
+        Demand::storage::<[u32; 2]>("ray_spans", batch.rays),
+        Demand::storage::<[u32; 2]>("kept_spans", batch.rays),
+        plan.tensor("ray_origins", Element::Vec4, batch.rays),
+        plan.tensor("ray_directions", Element::Vec4, batch.rays),
+        plan.tensor("samples", Element::Vec4, batch.samples + SPARE_ROWS),
+    ]
 }
 
 /// Marches the rays and writes their samples; `jitter` shifts each ray's samples at random.

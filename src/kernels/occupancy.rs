@@ -2,6 +2,7 @@
 
 use super::{COUNTERS, DENSITY, EXP, OCCUPANCY, Plan, RANDOM, STEP, Workspace, density};
 use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
 use crate::gpu::pass::{Size, Stage};
 use anyhow::Result;
 
@@ -19,14 +20,9 @@ const ENCODE: usize = 1;
 const ENCODE_END: usize = 2;
 const LAYERS_END: usize = 4;
 
-/// Allocates what only the update needs; `visible` lists the cells that can hold something.
-///
-/// # Errors
-/// When the adapter cannot hold it.
-pub fn allocate(gpu: &Gpu, workspace: &mut Workspace, visible: &[u32]) -> Result<()> {
-    workspace.add(gpu.storage::<f32>("occupancy_mean", 1)?);
-    workspace.add(gpu.storage_with("visible_cells", visible)?);
-    Ok(())
+/// What only the update needs, for `visible` cells that can hold something.
+pub(super) fn demands(visible: usize) -> Vec<Demand> {
+    vec![Demand::storage::<f32>("occupancy_mean", 1), Demand::storage::<u32>("visible_cells", visible.max(1))]
 }
 
 impl Update {

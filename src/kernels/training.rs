@@ -9,6 +9,7 @@ use super::{
 };
 use crate::config::Accumulation;
 use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
 use crate::gpu::kernel::Kernel;
 use crate::gpu::pass::{Size, Stage};
 use crate::gpu::tensor::{Element, Memory};
@@ -34,42 +35,35 @@ gpu_struct! {
 const D_COLOR_HIDDEN: [&str; 4] =
     ["d_color_hidden_1", "d_color_hidden_2", "d_color_hidden_3", "d_color_hidden_4"];
 
-/// Allocates targets, gradients and moments.
-///
-/// # Errors
-/// When the adapter cannot hold them.
-pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+/// Targets, gradients and moments.
+pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     let (batch, layout) = (&plan.config.batch, &plan.layout);
     let rows = kept_capacity(&plan.config.batch) + SPARE_ROWS;
     let width = plan.config.network.width;
-    for name in ["targets", "backgrounds", "rendered", "ray_errors"] {
-        workspace.add(gpu.storage::<[f32; 4]>(name, batch.rays)?);
-    }
-    if plan.needs.depth {
-        workspace.add(gpu.storage::<f32>("depth_targets", batch.rays)?);
-    }
-    let tensors = [
-        ("d_color", Element::Vec4, rows),
-        ("d_raw_color", Element::Vec4, rows),
-        ("d_density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
-        ("d_density_hidden", Element::Vec4, rows * width / 4),
-        ("d_encoding", Element::Vec4, rows * layout.encoding() / 4),
-        ("d_weight_chunks", Element::Vec4, plan.chunks * layout.quads),
-        ("table_moments", Element::Vec4, layout.entries),
-    ];
-    plan.allocate(gpu, workspace, &tensors)?;
-    let hidden = D_COLOR_HIDDEN.map(|name| (name, Element::Vec4, rows * width / 4));
-    plan.allocate(gpu, workspace, &hidden[..plan.config.network.color_layers])?;
     let ordered = plan.accumulation == Accumulation::Ordered;
     let memory = if ordered { plan.memory } else { Memory::Buffers };
     // Integers of 64 bits take twice the room of floats.
-    let rows = layout.entries * if plan.accumulation == Accumulation::Fixed { 2 } else { 1 };
-    workspace.add_tensor(gpu.tensor("d_table", Element::Vec2, rows, memory)?);
-    for name in ["mlp_first", "mlp_second", "d_weights"] {
-        workspace.add(gpu.storage::<[f32; 4]>(name, layout.quads)?);
+    let words = if plan.accumulation == Accumulation::Fixed { 2 } else { 1 };
+    let mut demands = vec![
+        plan.tensor("d_color", Element::Vec4, rows),
+        plan.tensor("d_raw_color", Element::Vec4, rows),
+        plan.tensor("d_density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
+        plan.tensor("d_density_hidden", Element::Vec4, rows * width / 4),
+        plan.tensor("d_encoding", Element::Vec4, rows * layout.encoding() / 4),
+        plan.tensor("d_weight_chunks", Element::Vec4, plan.chunks * layout.quads),
+        plan.tensor("table_moments", Element::Vec4, layout.entries),
+        Demand::tensor("d_table", Element::Vec2, layout.entries * words, memory),
+        Demand::storage::<u32>("gradient_range", 3),
+    ];
+    demands.extend(plan.color_hidden(&D_COLOR_HIDDEN, rows));
+    let of_rays = ["targets", "backgrounds", "rendered", "ray_errors"];
+    demands.extend(of_rays.map(|name| Demand::storage::<[f32; 4]>(name, batch.rays)));
+    let of_weights = ["mlp_first", "mlp_second", "d_weights"];
+    demands.extend(of_weights.map(|name| Demand::storage::<[f32; 4]>(name, layout.quads)));
+    if plan.needs.depth {
+        demands.push(Demand::storage::<f32>("depth_targets", batch.rays));
     }
-    workspace.add(gpu.storage::<u32>("gradient_range", 3)?);
-    Ok(())
+    demands
 }
 
 /// Draws the rays of a step.

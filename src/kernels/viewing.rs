@@ -2,19 +2,19 @@
 
 use super::{CAMERA, COUNTERS, Camera, EXP, Plan, RAY, RAY_STORE, STEP, SUM, Workspace, dispatch};
 use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
 use anyhow::Result;
 
-/// Allocates the camera and the results.
-///
-/// # Errors
-/// When the adapter cannot hold them.
-pub fn allocate(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+/// The camera and the results.
+#[must_use]
+pub fn demands(plan: &Plan) -> Vec<Demand> {
     let rays = plan.config.batch.rays;
-    workspace.add(gpu.storage::<Camera>("cameras", 1)?);
-    workspace.add(gpu.storage::<[f32; 4]>("view_color", rays)?);
-    workspace.add(gpu.storage::<f32>("view_depth", rays)?);
-    Ok(())
+    vec![
+        Demand::storage::<Camera>("cameras", 1),
+        Demand::storage::<[f32; 4]>("view_color", rays),
+        Demand::storage::<f32>("view_depth", rays),
+    ]
 }
 
 /// The rays of a chunk of pixels.

@@ -3,6 +3,7 @@
 use crate::gpu::Gpu;
 use crate::gpu::banks::Banks;
 use crate::gpu::buffer::Buffer;
+use crate::gpu::demand::{Allocation, Demand};
 use crate::gpu::kernel::{Bound, Kernel, Resource};
 use crate::gpu::tensor::Tensor;
 use anyhow::{Context, Result};
@@ -24,6 +25,20 @@ impl Workspace {
             buffer.name
         );
         self.buffers.push(buffer);
+    }
+
+    /// Allocates and adds what is demanded.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold it.
+    pub fn allocate(&mut self, gpu: &Gpu, demands: &[Demand]) -> Result<()> {
+        for demand in demands {
+            match demand.allocate(gpu)? {
+                Allocation::Buffer(buffer) => self.add(buffer),
+                Allocation::Tensor(tensor) => self.add_tensor(tensor),
+            }
+        }
+        Ok(())
     }
 
     /// Adds a tensor; its name must be new.

@@ -13,7 +13,7 @@ use crate::close::assert_close;
 #[test]
 fn rays_along_the_axes() -> Result<()> {
     let mut bench = workbench(Setup::tiny())?;
-    viewing::allocate(&bench.gpu, &bench.plan, &mut bench.workspace)?;
+    bench.workspace.allocate(&bench.gpu, &viewing::demands(&bench.plan))?;
     let stage = viewing::rays(&bench.gpu, &bench.plan, &bench.workspace)?;
     let near = bench.plan.config.march.near;
     for (origin, back, want) in [

@@ -1,0 +1,88 @@
+//! Buffers and tensors that are yet to be allocated: what something needs on a device, told before there is one.
+
+use super::Gpu;
+use super::buffer::Buffer;
+use super::tensor::{Element, Memory, Tensor};
+use anyhow::Result;
+use wgpu::BufferUsages;
+
+/// A buffer or a tensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Demand {
+    /// The name of the WGSL variable it stands for.
+    pub name: &'static str,
+    kind: Kind,
+    /// Bytes of an element.
+    size: usize,
+    count: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Buffer(BufferUsages),
+    Tensor(Element, Memory),
+}
+
+/// Something on a device.
+#[derive(Clone, Debug)]
+pub enum Allocation {
+    /// A buffer.
+    Buffer(Buffer),
+    /// A tensor.
+    Tensor(Tensor),
+}
+
+impl Demand {
+    /// A storage buffer of `count` elements of `T`.
+    #[must_use]
+    pub fn storage<T>(name: &'static str, count: usize) -> Self {
+        Self { name, kind: Kind::Buffer(BufferUsages::STORAGE), size: size_of::<T>(), count }
+    }
+
+    /// A buffer that kernels read as uniform and write as storage.
+    #[must_use]
+    pub fn uniform_storage<T>(name: &'static str, count: usize) -> Self {
+        Self {
+            kind: Kind::Buffer(BufferUsages::STORAGE | BufferUsages::UNIFORM),
+            ..Self::storage::<T>(name, count)
+        }
+    }
+
+    /// A uniform buffer of one `T`.
+    #[must_use]
+    pub fn uniform<T>(name: &'static str) -> Self {
+        Self { kind: Kind::Buffer(BufferUsages::UNIFORM), ..Self::storage::<T>(name, 1) }
+    }
+
+    /// A storage buffer of words that also holds the sizes of indirect dispatches.
+    #[must_use]
+    pub fn indirect(name: &'static str, count: usize) -> Self {
+        let kind = Kind::Buffer(BufferUsages::STORAGE | BufferUsages::INDIRECT);
+        Self { kind, ..Self::storage::<u32>(name, count) }
+    }
+
+    /// A tensor.
+    #[must_use]
+    pub fn tensor(name: &'static str, element: Element, count: usize, memory: Memory) -> Self {
+        Self { name, kind: Kind::Tensor(element, memory), size: element.bytes(), count }
+    }
+
+    /// Bytes on the device, but for the rounding of small buffers.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        (self.size * self.count) as u64
+    }
+
+    /// Allocates it, zeroed.
+    ///
+    /// # Errors
+    /// When it is larger than the adapter can bind; the message tells both sizes.
+    pub fn allocate(&self, gpu: &Gpu) -> Result<Allocation> {
+        Ok(match self.kind {
+            Kind::Buffer(usage) => Allocation::Buffer(gpu.buffer(self.name, self.bytes(), usage)?),
+            Kind::Tensor(element, memory) => {
+                Allocation::Tensor(gpu.tensor(self.name, element, self.count, memory)?)
+            }
+        })
+    }
+}
