@@ -70,6 +70,7 @@ pub mod file;
 pub mod gpu;
 pub mod image;
 pub mod kernels;
+pub mod memory;
 pub mod metrics;
 pub mod model;
 pub mod orbit;

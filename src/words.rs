@@ -21,6 +21,20 @@ pub fn short(number: f64) -> String {
     }
 }
 
+/// An amount of memory.
+#[must_use]
+pub fn bytes(count: u64) -> String {
+    const UNITS: [&str; 4] = ["bytes", "KiB", "MiB", "GiB"];
+    let mut unit = 0;
+    let mut value = count as f64;
+    while value >= 1024.0 && unit + 1 < UNITS.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    let digits = usize::from(unit > 0 && value < 99.95);
+    format!("{value:.digits$} {}", UNITS[unit])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -30,5 +44,7 @@ mod tests {
         let all = [0.25, 42.4, 119.0, 125.0, 7384.0].map(duration);
         assert_eq!(all, ["0.2 s", "42 s", "119 s", "2 min 05 s", "2 h 03 min"]);
         assert_eq!([7.0, 1234.0, 5.67e6].map(short), ["7", "1.2k", "5.7M"]);
+        let memory = [7, 1536, 400 << 20, 8_294_400_000].map(bytes);
+        assert_eq!(memory, ["7 bytes", "1.5 KiB", "400 MiB", "7.7 GiB"]);
     }
 }
