@@ -75,7 +75,7 @@ impl Memory {
 fn advice(needed: u64, available: u64) -> String {
     let ratio = needed as f64 / available.max(1) as f64;
     let downscale = ratio.sqrt().ceil();
-    if downscale > 64.0 {
+    if available == 0 || downscale > 64.0 {
         return "use a smaller table or batch (see configs/cpu.json), or another machine".to_owned();
     }
     format!(
