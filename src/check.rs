@@ -45,11 +45,12 @@ struct Check {
 }
 
 /// In the order of a training step.
-const CHECKS: [Check; 15] = [
+const CHECKS: [Check; 16] = [
     Check { name: "exponentials", run: |subject| Ok(vec![exponential::exponentials(subject)?]) },
     Check { name: "random numbers", run: |subject| Ok(vec![random::random_numbers(subject)?]) },
-    Check { name: "lenses", run: |subject| Ok(vec![lens::lens_model(subject)?]) },
+    Check { name: "lenses", run: lens::lens_models },
     Check { name: "rays of views", run: rays::view_rays },
+    Check { name: "rays of large views", run: rays::sharp_rays },
     Check { name: "rays of a training", run: |subject| Ok(vec![rays::training_rays(subject)?]) },
     Check { name: "marching", run: marching::marched_samples },
     Check { name: "hash grid", run: |subject| Ok(vec![grid::features(subject)?]) },

@@ -256,6 +256,7 @@ fn check_finite(name: &str, values: &[f32]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::LensKind;
     use glam::DVec3;
 
     fn checkpoint() -> Checkpoint {
@@ -263,7 +264,8 @@ mod tests {
         let small = r#"{"grid": {"levels": 8, "finest": 40, "log2_table": 8}, "occupancy": {"cells": 16}}"#;
         config.merge(&serde_json::from_str(small).expect("JSON")).expect("valid");
         let bounds = Bounds { center: DVec3::new(0.1, 0.2, 0.3), half: 1.5, cascades: 1, source: "x".into() };
-        let needs = Needs { lens: false, alpha: true, hdr: false, cascades: 1, cameras: 3 };
+        let lenses = [LensKind::OpenCv, LensKind::Fisheye].into();
+        let needs = Needs { lenses, alpha: true, hdr: false, cascades: 1, cameras: 3 };
         let about = About {
             format: FORMAT,
             dataset: "data/toys".into(),

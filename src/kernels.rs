@@ -14,6 +14,7 @@ pub(crate) use part;
 pub mod color;
 pub mod density;
 pub mod layer;
+pub mod lens;
 pub mod marching;
 pub mod occupancy;
 mod shared;
@@ -24,6 +25,7 @@ mod workspace;
 pub use shared::{Camera, Counters, Step};
 pub use workspace::Workspace;
 
+use crate::camera::LensKind;
 use crate::config::{Accumulation, Background, Config, Transmittance};
 use crate::gpu::Gpu;
 use crate::gpu::kernel::{Kernel, Shared};
@@ -32,6 +34,7 @@ use crate::gpu::tensor::{Element, Memory};
 use crate::model::{DENSITY_OUTPUTS, Layout, Level};
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fmt::Display;
 
 /// A file of WGSL under its name.
@@ -40,8 +43,9 @@ pub type Part = (&'static str, &'static str);
 pub(crate) const RANDOM: Part = part!("common/random.wgsl");
 const STEP: Part = part!("common/step.wgsl");
 const COUNTERS: Part = part!("common/counters.wgsl");
-const RAY: Part = part!("common/ray.wgsl");
-const CAMERA: Part = part!("common/camera.wgsl");
+pub(crate) const RAY: Part = part!("common/ray.wgsl");
+pub(crate) const SINE: Part = part!("common/sine.wgsl");
+pub(crate) const CAMERA: Part = part!("common/camera.wgsl");
 const RAY_LOAD: Part = part!("common/ray_load.wgsl");
 const RAY_STORE: Part = part!("common/ray_store.wgsl");
 const OCCUPANCY: Part = part!("common/occupancy.wgsl");
@@ -91,8 +95,8 @@ pub mod dispatch {
 /// What a scene needs, apart from the configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Needs {
-    /// Some camera has lens distortion.
-    pub lens: bool,
+    /// The lenses that cameras have; at least one.
+    pub lenses: BTreeSet<LensKind>,
     /// Some image has alpha.
     pub alpha: bool,
     /// Pixels are linear floats.
@@ -213,11 +217,17 @@ impl Plan {
         Kernel::new(gpu, &source, &layouts)
     }
 
-    /// The text of a kernel, before it is linked.
+    /// The text of a kernel, before it is linked. Cameras bring the lenses that the scene needs.
     #[must_use]
     pub fn source(&self, label: &str, parts: &[Part]) -> Source {
+        let add = |source: Source, (name, text): &Part| source.part(name, *text);
         let source = self.numbers(self.dimensions(Source::new(label).memory(self.memory)));
-        parts.iter().fold(source, |source, (name, text)| source.part(name, *text))
+        let source = parts.iter().fold(source, add);
+        if !parts.contains(&CAMERA) {
+            return source;
+        }
+        let lenses = &self.needs.lenses;
+        lens::parts(lenses).iter().fold(source, add).part("lens choice", lens::choice(lenses))
     }
 
     fn dimensions(&self, source: Source) -> Source {
@@ -275,10 +285,6 @@ impl Plan {
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         source.constant("BACKGROUND", vec3(config.background.solid()))
-    }
-
-    fn lens(&self) -> Part {
-        if self.needs.lens { part!("lens/opencv.wgsl") } else { part!("lens/pinhole.wgsl") }
     }
 
     fn stepping(&self) -> Part {

@@ -28,7 +28,7 @@
 //! # A training in code
 //!
 //! ```no_run
-//! use nerf::{config::Config, dataset::Dataset, gpu, kernels::{Needs, Plan}, model, train};
+//! use nerf::{camera::LensKind, config::Config, dataset::Dataset, gpu, kernels::{Needs, Plan}, model, train};
 //! use std::{path::Path, sync::Arc};
 //!
 //! # fn main() -> anyhow::Result<()> {
@@ -40,7 +40,7 @@
 //! let finest = model::finest_resolution(config.grid.base, &dataset.bounds, &cameras);
 //! let layout = model::Layout::new(&config, finest);
 //! let needs = Needs {
-//!     lens: false,
+//!     lenses: LensKind::among(&cameras),
 //!     alpha: images.iter().any(|image| image.has_alpha),
 //!     hdr: dataset.is_hdr,
 //!     cascades: dataset.bounds.cascades,

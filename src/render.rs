@@ -1,11 +1,12 @@
 //! The renderer: a trained field seen by any camera, in chunks of pixels.
 
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, LensKind};
 use crate::dataset::Bounds;
 use crate::gpu::Gpu;
 use crate::gpu::pass::Stage;
 use crate::kernels::{self, Counters, Plan, Step, Workspace, color, density, marching, viewing};
 use anyhow::{Result, bail};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Names of the buffers that a renderer shares with a trainer, or fills from a checkpoint.
@@ -25,7 +26,7 @@ pub struct View {
     pub height: u32,
     /// Premultiplied colour in the field's colour space (sRGB or linear), without background, and opacity.
     pub color: Vec<[f32; 4]>,
-    /// Mean distance along the view axis in world units; 0 where the opacity is below 1e-3.
+    /// Mean depth in world units, as [`LensKind::depth_is_distance`] defines it; 0 where the opacity is below 1e-3.
     pub depth: Vec<f32>,
 }
 
@@ -36,18 +37,24 @@ pub struct Renderer {
     workspace: Workspace,
     stages: Vec<Stage>,
     bounds: Bounds,
-    lens: bool,
+    lenses: BTreeSet<LensKind>,
     rays: u32,
 }
 
 impl Renderer {
-    /// A renderer of the field whose parameters `field` holds; `lens` links lens undistortion.
+    /// A renderer of the field whose parameters `field` holds, for cameras with `lenses`.
     ///
     /// # Errors
     /// When the adapter cannot hold a chunk or refuses a kernel.
-    pub fn new(gpu: &Arc<Gpu>, plan: &Plan, field: &Workspace, bounds: &Bounds, lens: bool) -> Result<Self> {
+    pub fn new(
+        gpu: &Arc<Gpu>,
+        plan: &Plan,
+        field: &Workspace,
+        bounds: &Bounds,
+        lenses: &BTreeSet<LensKind>,
+    ) -> Result<Self> {
         let mut plan = plan.clone();
-        plan.needs.lens = lens;
+        plan.needs.lenses.clone_from(lenses);
         plan.config.batch.samples = SAMPLES.max(plan.config.march.most_steps);
         plan.config.batch.kept = plan.config.batch.samples;
         plan.config.batch.rays = RAYS;
@@ -64,7 +71,8 @@ impl Renderer {
         stages.extend(density::stages(gpu, &plan, &workspace)?);
         stages.extend(color::stages(gpu, &plan, &workspace, color::Selection::All)?);
         stages.push(viewing::composite(gpu, &plan, &workspace)?);
-        Ok(Self { gpu: Arc::clone(gpu), workspace, stages, bounds: bounds.clone(), lens, rays: 1024 })
+        let (gpu, bounds, lenses) = (Arc::clone(gpu), bounds.clone(), lenses.clone());
+        Ok(Self { gpu, workspace, stages, bounds, lenses, rays: 1024 })
     }
 
     /// Renders what `camera` sees.
@@ -72,8 +80,14 @@ impl Renderer {
     /// # Errors
     /// When the device was lost, or the camera has a lens that was not linked.
     pub fn render(&mut self, camera: &Camera) -> Result<View> {
-        if camera.lens != Lens::Pinhole && !self.lens {
-            bail!("this renderer was built without lens distortion, and the camera has it");
+        let kind = camera.lens.kind();
+        if !self.lenses.contains(&kind) {
+            let linked: Vec<_> = self.lenses.iter().map(|kind| kind.name()).collect();
+            bail!(
+                "this renderer was built for the lenses {}, and the camera's is {}; name all lenses when building it",
+                linked.join(", "),
+                kind.name()
+            );
         }
         let pixels = camera.width as usize * camera.height as usize;
         let mut color = Vec::with_capacity(pixels);

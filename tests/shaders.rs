@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use nerf::camera::LensKind;
 use nerf::config::{Accumulation, Config};
 use nerf::gpu::kernel::{Layout as StructLayout, Shared};
 use nerf::gpu::source::{Linked, Source};
@@ -39,6 +40,17 @@ fn files() -> Vec<File> {
     files
 }
 
+/// The choice between the lenses of every set of cameras: a part that the plan writes.
+fn lens_choices() -> Vec<File> {
+    (1..1 << LensKind::ALL.len())
+        .map(|members: u32| {
+            let is_member = |kind: &LensKind| members >> (*kind as u32) & 1 == 1;
+            let kinds: BTreeSet<LensKind> = LensKind::ALL.into_iter().filter(is_member).collect();
+            (format!("lens choice {kinds:?}"), nerf::kernels::lens::choice(&kinds))
+        })
+        .collect()
+}
+
 /// What a part defines for others.
 fn definitions(text: &str) -> Vec<String> {
     let name =
@@ -61,7 +73,8 @@ fn definitions(text: &str) -> Vec<String> {
 
 fn plan(memory: Memory, cascades: u32) -> Plan {
     let config = Config::default();
-    let needs = Needs { lens: true, alpha: true, hdr: false, cascades, cameras: 3 };
+    let lenses = [LensKind::Pinhole].into();
+    let needs = Needs { lenses, alpha: true, hdr: false, cascades, cameras: 3 };
     let layout = Layout::new(&config, 2048);
     let product = Product { rows: 2, shared_weights: false };
     Plan { config, layout, needs, product, accumulation: Accumulation::Exchange, memory, chunks: 32 }
@@ -85,7 +98,8 @@ const SHARED: [StructLayout; 5] =
 
 impl Linker {
     fn new(plan: Plan) -> Self {
-        let parts: Vec<File> = files().into_iter().filter(|(name, _)| name.contains('/')).collect();
+        let mut parts: Vec<File> = files().into_iter().filter(|(name, _)| name.contains('/')).collect();
+        parts.extend(lens_choices());
         let mut definers: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for (index, (_, text)) in parts.iter().enumerate() {
             for name in definitions(text) {
@@ -198,7 +212,7 @@ fn every_combination_links() {
 /// A folder is a slot: its files define the same functions, so that each can take another's place.
 #[test]
 fn variants_are_interchangeable() {
-    for slot in ["activation", "background", "lens", "pixels", "stepping", "transmittance", "weights"] {
+    for slot in ["activation", "background", "pixels", "stepping", "transmittance", "weights"] {
         let mut wanted: Option<(String, BTreeSet<String>)> = None;
         for (name, text) in files().into_iter().filter(|(name, _)| name.starts_with(&format!("{slot}/"))) {
             let prefix =

@@ -1,6 +1,7 @@
 //! What a workbench is built from.
 
 use super::draw::SEED;
+use crate::camera::LensKind;
 use crate::config::{
     self, Accumulation, Batch, Config, Grid, March, Network, Occupancy, Optimizer, Selection,
 };
@@ -43,7 +44,8 @@ impl Setup {
             seed: SEED,
             ..Config::default()
         };
-        let needs = Needs { lens: false, alpha: true, hdr: false, cascades: 1, cameras: 1 };
+        let lenses = [LensKind::Pinhole].into();
+        let needs = Needs { lenses, alpha: true, hdr: false, cascades: 1, cameras: 1 };
         Self { config, needs, finest: 40, product: None, memory: None }
     }
 

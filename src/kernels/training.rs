@@ -81,7 +81,6 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
         RAY,
         RAY_STORE,
         CAMERA,
-        plan.lens(),
         plan.pixels(),
         plan.background(),
         part!("rays.wgsl"),

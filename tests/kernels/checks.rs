@@ -26,14 +26,20 @@ fn random_numbers() -> Result<()> {
 }
 
 #[test]
-fn lens_model() -> Result<()> {
-    passes([lens::lens_model(&subject()?)?]);
+fn lens_models() -> Result<()> {
+    passes(lens::lens_models(&subject()?)?);
     Ok(())
 }
 
 #[test]
 fn view_rays() -> Result<()> {
     passes(rays::view_rays(&subject()?)?);
+    Ok(())
+}
+
+#[test]
+fn sharp_rays() -> Result<()> {
+    passes(rays::sharp_rays(&subject()?)?);
     Ok(())
 }
 
