@@ -4,7 +4,7 @@ use crate::commands::find_frames;
 use crate::progress::{duration, short};
 use crate::remarks::Remarks;
 use anyhow::{Result, ensure};
-use nerf::camera::{Camera, Lens};
+use nerf::camera::{Camera, LensKind};
 use nerf::checkpoint::{About, Checkpoint, FORMAT, Splits};
 use nerf::config::{Background, Config};
 use nerf::dataset::Dataset;
@@ -119,17 +119,22 @@ impl Setup {
     }
 
     /// The parts that the scene does not need.
-    pub(in crate::commands) fn left_out(&self, dataset: &Dataset) -> Vec<&'static str> {
+    pub(in crate::commands) fn left_out(&self, dataset: &Dataset) -> Vec<String> {
         let needs = &self.plan.needs;
         let parts = [
-            (!needs.lens, "lens model (all cameras are pinholes)"),
             (needs.cascades == 1, "cascades and growing steps (the scene is bounded)"),
             (!needs.alpha && !needs.hdr, "alpha (the images are opaque)"),
             (!needs.hdr, "linear pixels (the images have 8 bits)"),
             (self.about.config.background != Background::Random, "random backgrounds (not asked for)"),
             (dataset.is_hdr, "8-bit pixels (the images are linear)"),
         ];
-        parts.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, part)| part).collect()
+        let absent = LensKind::ALL.into_iter().filter(|kind| !needs.lenses.contains(kind));
+        let absent: Vec<_> = absent.map(LensKind::name).collect();
+        let lenses =
+            (!absent.is_empty()).then(|| format!("lens models {} (no camera has them)", absent.join("/")));
+        let others =
+            parts.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, part)| part.to_owned());
+        lenses.into_iter().chain(others).collect()
     }
 }
 
@@ -160,7 +165,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
     if config.grid.finest == 0 {
         config.grid.finest = finest_resolution(config.grid.base, &bounds, &cameras);
     }
-    let mut used = dataset.train.iter().chain(&dataset.test);
+    let used = dataset.train.iter().chain(&dataset.test);
     let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
     let orbit = Orbit::of(&cameras, bounds.center);
     Ok(About {
@@ -172,7 +177,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
         seconds: 0.0,
         budget: Budget::default(),
         needs: Needs {
-            lens: used.any(|&index| dataset.frames[index].camera.lens != Lens::Pinhole),
+            lenses: LensKind::among(used.map(|&index| &dataset.frames[index].camera)),
             alpha: dataset.train.iter().any(|&index| dataset.frames[index].has_alpha),
             hdr: dataset.is_hdr,
             cascades: bounds.cascades,
