@@ -59,9 +59,10 @@ fn leave_out(entries: &mut Vec<Entry>, mirrored: bool, notes: &mut Notes) {
     }
     let named = odd[..odd.len().min(3)].join(", ");
     let more = if odd.len() > 3 { ", …" } else { "" };
-    let handed = if mirrored { "mirrored" } else { "not mirrored" };
+    let verb = if odd.len() == 1 { "is" } else { "are" };
+    let handed = format!("{verb} {}mirrored", if mirrored { "" } else { "not " });
     notes.warn(format!(
-        "{} frames are {handed}, unlike the others, and left out: {named}{more}; export them again",
+        "{} of the frames {handed}, unlike the others, and left out: {named}{more}; export them again",
         odd.len()
     ));
     entries.retain(|entry| is_mirrored(entry) != mirrored);
@@ -190,7 +191,8 @@ mod tests {
         let listing = ring(20, 1.0, |index| index == 7).expect("valid");
         assert_eq!(listing.frames.len(), 19);
         assert!(
-            messages(listing).contains("1 frames are mirrored, unlike the others, and left out: frame 7")
+            messages(listing)
+                .contains("1 of the frames is mirrored, unlike the others, and left out: frame 7")
         );
         let listing = ring(20, 1.0, |index| index != 7).expect("valid");
         assert_eq!(listing.frames.len(), 19);
