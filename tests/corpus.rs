@@ -136,7 +136,9 @@ fn assert_close(what: &str, got: &[f64], expected: &[f64], tolerance: f64) {
 fn check_frame(name: &str, entry: &transforms::Entry, frame: &Value, file: &Value, third: f64) {
     let layers = layers(frame, file);
     let declared = first(&layers, "w").zip(first(&layers, "h"));
-    let size = declared.map_or([SIZE; 2], <[f64; 2]>::from);
+    let doubled =
+        first(&layers, "cx").zip(first(&layers, "cy")).map(|(x, y)| ((2.0 * x).round(), (2.0 * y).round()));
+    let size = declared.or(doubled).map_or([SIZE; 2], <[f64; 2]>::from);
     let camera_at = |scale: f64| {
         let size = size.map(|side| (scale * side).round() as u32);
         entry.intrinsics.camera(size, entry.world_from_camera).0
@@ -199,8 +201,8 @@ fn every_frame_of_the_corpus_is_read_as_written() {
         for (index, (entry, frame)) in listing.frames.iter().zip(frames).enumerate() {
             check_frame(&format!("{name} {index}"), entry, frame, &plain, third);
         }
-        let size = listing.frames[0].intrinsics.declared_size.map_or([SIZE; 2], |size| size.to_array());
         let entry = &listing.frames[0];
+        let size = entry.intrinsics.likely_size().map_or([SIZE; 2], |size| size.to_array());
         let size = size.map(|side| side.round() as u32);
         let camera = entry.intrinsics.camera(size, entry.world_from_camera).0;
         assert_eq!(camera.lens.kind(), expected.lens, "{name}");

@@ -94,6 +94,17 @@ impl Intrinsics {
         Ok(Self { declared_size: declared.both(), focal, center, lens })
     }
 
+    /// The image size that the file means: the declared one, else the one that its lengths in pixels imply.
+    pub fn likely_size(&self) -> Option<DVec2> {
+        let focal = match self.focal {
+            Some(Focal::Pixels(measure)) => measure.size.both(),
+            _ => None,
+        };
+        let center = self.center.map(|center| center.size.both().unwrap_or(2.0 * center.px));
+        let usable = |size: &DVec2| size.min_element() >= 1.0 && size.max_element() < 1e6;
+        self.declared_size.or(focal.filter(usable)).or(center.filter(usable))
+    }
+
     /// The camera that took an image of this size in pixels, and what is to be said about it. Lengths in
     /// pixels that belong to another size are scaled.
     pub fn camera(&self, size: [u32; 2], pose: DAffine3) -> (Camera, Vec<Note>) {
