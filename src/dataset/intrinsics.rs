@@ -94,6 +94,11 @@ impl Intrinsics {
         Ok(Self { declared_size: declared.both(), focal, center, lens })
     }
 
+    /// Whether the camera looks everywhere, so that its view axis says nothing.
+    pub(super) fn is_whole_sphere(&self) -> bool {
+        self.lens == Lens::Equirectangular
+    }
+
     /// The image size that the file means: the declared one, else the one that its lengths in pixels imply.
     pub fn likely_size(&self) -> Option<DVec2> {
         let focal = match self.focal {

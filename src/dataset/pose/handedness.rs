@@ -93,7 +93,8 @@ struct Convergence {
 }
 
 impl Convergence {
-    /// `None` for fewer than three cameras, and where the axes are too parallel to meet.
+    /// `None` for fewer than three cameras, where the axes are too parallel to meet, and for cameras that
+    /// look everywhere.
     fn of(entries: &[Entry]) -> Option<Self> {
         let poses = || entries.iter().map(|entry| entry.world_from_camera);
         let count = entries.len() as f64;
@@ -103,7 +104,8 @@ impl Convergence {
         };
         // The point nearest to all axes: the sum of the projections across them is inverted.
         let sum = poses().fold(DMat3::ZERO, |sum, pose| sum + across(pose));
-        if entries.len() < 3 || sum.determinant() < 1e-3 * count.powi(3) {
+        let looks_everywhere = entries.iter().any(|entry| entry.intrinsics.is_whole_sphere());
+        if entries.len() < 3 || looks_everywhere || sum.determinant() < 1e-3 * count.powi(3) {
             return None;
         }
         let target = poses().fold(DVec3::ZERO, |sum, pose| sum + across(pose) * pose.translation);
