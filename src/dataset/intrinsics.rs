@@ -179,7 +179,8 @@ impl Stated {
             let from_angle = 0.5 * size[axis] / angle.half_tangent();
             let equidistant = size[axis] / angle.radians;
             let agrees = |other: f64| (other / focal[axis] - 1.0).abs() < 0.01;
-            if !agrees(from_angle) && !(matches!(lens, Lens::Fisheye { .. }) && agrees(equidistant)) {
+            let is_fisheye = matches!(lens, Lens::Fisheye { .. });
+            if !(agrees(from_angle) || is_fisheye && agrees(equidistant)) {
                 let message = format!(
                     "`{}` is {:.2} pixels but `{}`, the field of view beside it, means {from_angle:.2}; the \
                      pixels are used",

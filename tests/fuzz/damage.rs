@@ -1,18 +1,11 @@
-//! The reader of transforms.json under random damage: it never panics, is quick, and says little.
-//!
-//! `NERF_FUZZ_CASES=1000000 cargo test --test fuzz -- --nocapture` runs longer than the few thousand
-//! cases of an ordinary test run, and prints how long it took.
+//! Documents as tools write them, and what may happen to them.
 
-use std::time::{Duration, Instant};
-
-use nerf::dataset::transforms::{self, Listing};
 use proptest::collection::vec;
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 /// Documents as the known tools write them.
-fn seeds() -> Vec<Value> {
+pub(crate) fn seeds() -> Vec<Value> {
     let pose =
         |x: f64| json!([[1.0, 0.0, 0.0, x], [0.0, 0.8, -0.6, 2.0], [0.0, 0.6, 0.8, 3.0], [0, 0, 0, 1]]);
     let frame = |index: u32, more: Value| {
@@ -54,7 +47,7 @@ fn seeds() -> Vec<Value> {
 }
 
 /// Values that a key does not expect.
-fn odd_values() -> Vec<Value> {
+pub(crate) fn odd_values() -> Vec<Value> {
     let nested = (0..100).fold(json!(1), |inner, _| json!([inner]));
     let flip = json!([[-1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]);
     vec![
@@ -162,14 +155,14 @@ enum Noise {
 
 /// A seed, damaged as a document, written, and damaged as bytes.
 #[derive(Clone, Debug)]
-struct Case {
+pub(crate) struct Case {
     seed: u8,
     damage: Vec<Damage>,
     noise: Vec<Noise>,
     as_utf16: bool,
 }
 
-fn cases() -> impl Strategy<Value = Case> {
+pub(crate) fn cases() -> impl Strategy<Value = Case> {
     let damage = prop_oneof![
         (any::<u16>(), any::<u8>()).prop_map(|(node, value)| Damage::Replace { node, value }),
         (any::<u16>(), any::<u8>(), any::<u8>()).prop_map(|(node, key, value)| Damage::Insert {
@@ -237,9 +230,7 @@ impl Damage {
                 }
             }
             Self::Remove { node } => match at(document, node) {
-                Some(Value::Object(map)) => {
-                    *map = map.iter().skip(1).map(|(k, v)| (k.clone(), v.clone())).collect::<Map<_, _>>()
-                }
+                Some(Value::Object(map)) => *map = std::mem::take(map).into_iter().skip(1).collect(),
                 Some(Value::Array(list)) => drop(list.pop()),
                 _ => {}
             },
@@ -281,7 +272,8 @@ impl Noise {
 }
 
 impl Case {
-    fn bytes(&self, seeds: &[Value], odd: &[Value]) -> Vec<u8> {
+    /// The damaged document.
+    pub(crate) fn bytes(&self, seeds: &[Value], odd: &[Value]) -> Vec<u8> {
         let mut document = seeds[usize::from(self.seed) % seeds.len()].clone();
         for damage in &self.damage {
             damage.apply(&mut document, odd);
@@ -297,110 +289,4 @@ impl Case {
             _ => bytes,
         }
     }
-}
-
-/// Whatever is accepted can be used.
-fn check_listing(listing: &Listing) -> Result<(), TestCaseError> {
-    prop_assert!(!listing.frames.is_empty());
-    for entry in &listing.frames {
-        for size in [[64, 48], [1, 60_000]] {
-            let camera = entry.intrinsics.camera(size, entry.world_from_camera).0;
-            prop_assert!(camera.focal_px.is_finite() && camera.focal_px.min_element() > 0.0, "{camera:?}");
-            prop_assert!(camera.center_px.is_finite() && camera.world_from_camera.is_finite(), "{camera:?}");
-            let axes = camera.world_from_camera.matrix3;
-            prop_assert!((axes.transpose() * axes).abs_diff_eq(glam::DMat3::IDENTITY, 1e-9), "{camera:?}");
-        }
-    }
-    if let Some(scene_box) = listing.scene_box {
-        prop_assert!(scene_box.scale.is_finite() && scene_box.scale > 0.0 && scene_box.offset.is_finite());
-    }
-    Ok(())
-}
-
-fn check(bytes: &[u8], slowest: &mut Duration, accepted: &mut usize) -> Result<(), TestCaseError> {
-    let start = Instant::now();
-    let result = transforms::parse_bytes(bytes);
-    let elapsed = start.elapsed();
-    *slowest = elapsed.max(*slowest);
-    // A busy machine may stop a test for a while; a hang is longer.
-    prop_assert!(elapsed < Duration::from_secs(2), "{} bytes took {elapsed:?}", bytes.len());
-    let said: usize = match &result {
-        Ok(listing) => {
-            *accepted += 1;
-            check_listing(listing)?;
-            listing.notes().iter().map(|note| note.message.len()).sum()
-        }
-        Err(error) => format!("{error:#}").len(),
-    };
-    prop_assert!(said < 4096 + 2 * bytes.len(), "{said} bytes are said about {}", bytes.len());
-    Ok(())
-}
-
-/// Resident memory in MiB, where the system tells.
-fn resident() -> Option<usize> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
-    Some(line.split_whitespace().nth(1)?.parse::<usize>().ok()? / 1024)
-}
-
-#[test]
-fn damaged_files_are_refused_or_read() {
-    let cases_wanted = std::env::var("NERF_FUZZ_CASES").ok().map_or(4000, |n| n.parse().expect("a number"));
-    let config = Config { cases: cases_wanted, failure_persistence: None, ..Config::default() };
-    let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
-    let (seeds, odd) = (seeds(), odd_values());
-    for seed in &seeds {
-        transforms::parse(&seed.to_string()).expect("the seeds are valid");
-    }
-    let state = std::cell::RefCell::new((0usize, 0usize, Duration::ZERO, None));
-    let start = Instant::now();
-    let outcome = runner.run(&cases(), |case| {
-        let mut state = state.borrow_mut();
-        let (runs, accepted, slowest, warm) = &mut *state;
-        *runs += 1;
-        if *runs == 1000 {
-            *warm = resident();
-        }
-        check(&case.bytes(&seeds, &odd), slowest, accepted)
-    });
-    let (runs, accepted, slowest, warm) = state.into_inner();
-    let seconds = start.elapsed().as_secs_f64();
-    eprintln!(
-        "{runs} executions in {seconds:.1} s ({:.0}/s), {accepted} accepted, slowest {slowest:?}, resident {warm:?} \
-         to {:?} MiB",
-        runs as f64 / seconds,
-        resident()
-    );
-    outcome.expect("no case fails");
-    assert!(runs < 100 || (accepted > runs / 20 && accepted < runs / 20 * 19), "{accepted} of {runs}");
-    if let Some((before, after)) = warm.zip(resident()) {
-        assert!(after < before + 64, "memory grew from {before} to {after} MiB");
-    }
-}
-
-/// Each frame gives cause to several remarks with numbers of its own, and is in a list.
-#[test]
-fn many_frames_take_time_in_proportion() {
-    let count = 100_000;
-    let mut frames = String::new();
-    let mut names = String::new();
-    for index in 0..count {
-        let separator = if index == 0 { "" } else { "," };
-        let (w, x) = (1000 + index % 977, f64::from(index) * 0.001);
-        frames += &format!(
-            "{separator}{{\"file_path\": \"images/{index:06}.png\", \"w\": {w}, \"h\": 800, \"fl_x\": {}, \
-             \"camera_angle_x\": 0.5, \"transform_matrix\": [[2,0,0,{x}],[0,2,0,0],[0,0,2,1],[0,0,0,1]],}}\n",
-            900 + index
-        );
-        names += &format!("{separator}\"C:\\\\data\\\\images\\\\{index:06}.jpg\"");
-    }
-    let text = format!("{{\"train_filenames\": [{names}], \"frames\": [{frames}]}}");
-    let start = Instant::now();
-    let listing = transforms::parse(&text).expect("valid");
-    let elapsed = start.elapsed();
-    eprintln!("{count} frames, {} MB: {elapsed:?}", text.len() / 1_000_000);
-    assert_eq!(listing.frames.len(), 100_000);
-    assert!(listing.frames.iter().all(|entry| entry.split.is_some()));
-    assert_eq!(listing.notes().len(), 2, "{:?}", listing.notes());
-    assert!(elapsed < Duration::from_secs(60), "{elapsed:?}");
 }
