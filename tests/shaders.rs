@@ -221,7 +221,6 @@ fn variants_are_interchangeable() {
         "background",
         "depth_loss",
         "depth_target",
-        "lens",
         "loss",
         "pixels",
         "position",
