@@ -340,6 +340,7 @@ fn upload(gpu: &Gpu, views: &Views<'_>, workspace: &mut Workspace) -> Result<()>
 fn write_pixels(gpu: &Gpu, buffer: &Buffer, first: usize, pixels: &Pixels) {
     match pixels {
         Pixels::Srgb8(data) => gpu.write(buffer, first, data),
+        Pixels::Srgb16(data) => gpu.write(buffer, first, &Pixels::to_srgb8(data)),
         Pixels::Linear(data) => gpu.write(buffer, first, data),
     }
 }

@@ -140,6 +140,7 @@ fn opaque_sums(image: &Image) -> Vec<u32> {
     let (width, height) = (image.width as usize, image.height as usize);
     let is_opaque = |index: usize| match &image.pixels {
         Pixels::Srgb8(pixels) => pixels[index][3] > 0,
+        Pixels::Srgb16(pixels) => pixels[index][3] > 0,
         Pixels::Linear(pixels) => pixels[index][3] > 0.0,
     };
     let mut sums = vec![0; (width + 1) * (height + 1)];
