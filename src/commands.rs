@@ -12,10 +12,12 @@ mod report;
 mod scores;
 mod train;
 
+use crate::cli::reading::Reading;
 use crate::cli::{Cli, Command, Global};
+use crate::progress::Progress;
 use crate::remarks::Remarks;
 use anyhow::{Context, Result};
-use nerf::dataset::Dataset;
+use nerf::dataset::{Dataset, OpenOptions, Photo};
 use nerf::gpu::{Gpu, adapter};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -87,6 +89,24 @@ fn writable_folder(path: &Path) -> Result<()> {
     let attempt = tempfile::Builder::new().prefix(".nerf-").tempfile_in(path);
     attempt.with_context(|| format!("the folder {show} cannot be written to"))?;
     Ok(())
+}
+
+/// Opens a dataset to compare a field with: the photos are read as the command line says, else as usual.
+fn open_to_compare(path: &Path, reading: &Reading) -> Result<Dataset> {
+    let reading = reading.over(nerf::dataset::Reading::default());
+    Dataset::open(path, &OpenOptions { reading, ..OpenOptions::default() })
+}
+
+/// Decodes frames, with progress.
+fn load(dataset: &Dataset, indices: &[usize], remarks: Remarks) -> Result<Vec<Photo>> {
+    let progress = Progress::new(remarks, "loading");
+    let mut photos = Vec::with_capacity(indices.len());
+    dataset.stream(indices, false, &mut |position, photo| {
+        photos.push(photo);
+        progress.count(position + 1, indices.len(), "images");
+        Ok(())
+    })?;
+    Ok(photos)
 }
 
 /// The indices of the frames called `names`, and the names that the dataset lacks.

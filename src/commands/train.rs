@@ -8,14 +8,14 @@ pub(super) mod setup;
 pub(super) mod stages;
 
 use super::exam::Exam;
-use super::{Session, report, writable_folder};
+use super::{Session, load, report, writable_folder};
 use crate::cli::Train;
-use crate::progress::{Progress, duration};
+use crate::progress::duration;
 use anyhow::Result;
 use course::{Course, End};
 use folder::RunFolder;
 use nerf::checkpoint::About;
-use nerf::dataset::{Dataset, OpenOptions};
+use nerf::dataset::{Dataset, OpenOptions, Reading};
 use nerf::report::views::TestViews;
 use nerf::schedule::Budget;
 use nerf::train::{Trainer, Views};
@@ -29,7 +29,8 @@ const FEW_VIEWS: usize = 4;
 
 pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let mut folder = RunFolder::inspect(args)?;
-    let options = OpenOptions { hold_out: args.hold_out, ..OpenOptions::default() };
+    let reading = args.reading.over(Reading::default());
+    let options = OpenOptions { hold_out: args.hold_out, reading, ..OpenOptions::default() };
     let dataset = Dataset::open(&args.dataset, &options)?;
     session.remarks.notes(&dataset);
     let gpu = session.open_gpu()?;
@@ -46,11 +47,8 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     setup.describe(&dataset, &gpu, session.remarks);
     writable_folder(&args.out)?;
     let clock = Instant::now();
-    let images = {
-        let progress = Progress::new(session.remarks, "loading");
-        let count = setup.train.len();
-        dataset.load_images(&setup.train, &|done| progress.count(done, count, "images"))?
-    };
+    let photos = load(&dataset, &setup.train, session.remarks)?;
+    let images: Vec<_> = photos.into_iter().map(|photo| photo.image).collect();
     let load_seconds = clock.elapsed().as_secs_f64();
     let clock = Instant::now();
     let views = Views { cameras: &setup.cameras, images: &images, bounds: &setup.about.bounds };

@@ -7,8 +7,9 @@ use serde_json::Value;
 use super::Split;
 use super::intrinsics::{self, Intrinsics};
 use super::json::{self, Fields, describe};
-use super::notes::{Notes, Severity};
+use super::notes::Notes;
 use super::pose;
+use super::sidecars::{self, DepthEntry};
 
 /// One parsed file.
 #[derive(Debug)]
@@ -35,6 +36,10 @@ pub struct Entry {
     pub world_from_camera: DAffine3,
     /// The split that the file's own lists put the frame in.
     pub split: Option<Split>,
+    /// Its mask as the file spells it, with forward slashes; black pixels of it are ignored.
+    pub mask_path: Option<String>,
+    /// Its depth file.
+    pub depth: Option<DepthEntry>,
 }
 
 /// A scene box in instant-ngp's terms: `world * scale + offset` maps the inner cube to `[0, 1]³`.
@@ -94,16 +99,15 @@ fn entry(frame: &Value, file: Fields, lists: &SplitLists, label: &str, notes: &m
         layers.push(Fields(nested));
     }
     layers.push(file);
-    if fields.has(&["mask_path"]) {
-        let message = "masks (`mask_path`) are not used; the masked pixels are trained on";
-        notes.frame(Severity::Warning, label, message);
-    }
+    let (mask_path, depth) = sidecars::listed(fields, file)?;
     Ok(Entry {
         label: label.to_owned(),
         intrinsics: intrinsics::read(&layers, label, notes)?,
         world_from_camera: pose::read(fields, label, notes)?,
         split: lists.split_of(&file_path),
         file_path,
+        mask_path,
+        depth,
     })
 }
 

@@ -8,8 +8,8 @@ use crate::cli::bench::Training;
 use crate::commands::exam::Exam;
 use crate::commands::train::pace::Pace;
 use crate::commands::train::setup::{Setup, Wishes};
-use crate::commands::{Session, writable_folder};
-use crate::progress::{Progress, short};
+use crate::commands::{Session, load, writable_folder};
+use crate::progress::short;
 use anyhow::{Context, Result, ensure};
 use curve::{Curve, follow};
 use nerf::dataset::{Dataset, OpenOptions};
@@ -65,11 +65,8 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
     let gpu = session.open_gpu()?;
     let entries = entries(args, &dataset, &gpu)?;
     writable_folder(&args.out)?;
-    let images = {
-        let progress = Progress::new(session.remarks, "loading");
-        let count = dataset.train.len();
-        dataset.load_images(&dataset.train, &|done| progress.count(done, count, "images"))?
-    };
+    let photos = load(&dataset, &dataset.train, session.remarks)?;
+    let images = photos.into_iter().map(|photo| photo.image).collect();
     let load_seconds = clock.elapsed().as_secs_f64();
     let course = Course { gpu, dataset: &dataset, images, views: args.views as usize };
     let about = joined(

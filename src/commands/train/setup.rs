@@ -219,7 +219,7 @@ fn same_frames(about: &About, dataset: &Dataset) -> Result<(Vec<usize>, Vec<usiz
     );
     ensure!(
         about.needs.hdr == dataset.is_hdr,
-        "the training began with images of another kind (8-bit or linear OpenEXR); resume with {}",
+        "the training began with images of another kind (display-referred or linear); resume with {}",
         about.dataset
     );
     Ok((train, find_frames(dataset, &about.splits.test).0))
