@@ -73,6 +73,13 @@ impl Camera {
         self.world_from_camera.translation
     }
 
+    /// The part of the view inside a window of `size` pixels, whose top-left corner is at `corner`, in pixels.
+    pub fn cropped(&self, corner: [u32; 2], size: [u32; 2]) -> Self {
+        let [left, top] = corner.map(f64::from);
+        let [width, height] = size;
+        Self { width, height, center_px: self.center_px - DVec2::new(left, top), ..*self }
+    }
+
     /// The same view at another image size in pixels; the intrinsics scale along.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let scale =
@@ -250,6 +257,16 @@ mod tests {
         assert!(right.origin.distance(camera.position() + axes.x_axis) < 1e-12);
         assert!(down.origin.distance(camera.position() - axes.y_axis) < 1e-12);
         assert_eq!(right.direction, down.direction);
+    }
+
+    #[test]
+    fn a_cropped_camera_sees_the_same() {
+        let camera = camera(lenses()[1].0);
+        let part = camera.cropped([30, 200], [500, 700]);
+        assert_eq!((part.width, part.height), (500, 700));
+        let whole = camera.ray(DVec2::new(100.0, 250.0)).expect("inside");
+        let same = part.ray(DVec2::new(70.0, 50.0)).expect("inside");
+        assert!(whole.direction.distance(same.direction) < 1e-14);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod check;
+pub(crate) mod reading;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::config::Background;
@@ -110,6 +111,9 @@ pub(crate) struct Train {
     /// Do not measure the test views at the end
     #[arg(long)]
     pub(crate) no_eval: bool,
+    /// How photos are read.
+    #[command(flatten)]
+    pub(crate) reading: reading::Reading,
 }
 
 /// `nerf render`
@@ -176,6 +180,9 @@ pub(crate) struct Eval {
     /// Write the renderings, over the background, as PNG to this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) save: Option<PathBuf>,
+    /// How photos are read.
+    #[command(flatten)]
+    pub(crate) reading: reading::Reading,
 }
 
 /// `nerf report`
@@ -189,6 +196,9 @@ pub(crate) struct Report {
     /// The page to write [default: RUN/report.html]
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
+    /// How photos are read.
+    #[command(flatten)]
+    pub(crate) reading: reading::Reading,
 }
 
 /// `nerf generate`
