@@ -332,8 +332,8 @@ mod tests {
         let (_folder, path) = saved();
         let text = |about: &About| serde_json::to_string(about).expect("JSON");
         let about = checkpoint().about;
-        let newer = About { format: 2, ..about.clone() };
-        assert!(format!("{:#}", About::parse(&text(&newer)).expect_err("newer")).contains("found 2"));
+        let newer = About { format: FORMAT + 1, ..about.clone() };
+        assert!(format!("{:#}", About::parse(&text(&newer)).expect_err("newer")).contains("found 3"));
         let bytes = std::fs::read(&path).expect("readable");
         let (from, to) = (r#"\"log2_table\":8"#, r#"\"log2_table\":9"#);
         let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect("there");

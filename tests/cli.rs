@@ -146,7 +146,7 @@ fn files_that_are_no_checkpoint_are_explained() {
     let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
     bytes.extend(header.as_bytes());
     fs::write(here.path().join("newer"), &bytes).expect("writable");
-    render("newer", &["expected format 1, found 77", "another version"]);
+    render("newer", &["expected format 2, found 77", "another version"]);
 }
 
 #[test]
