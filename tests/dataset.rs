@@ -191,7 +191,7 @@ fn mistakes_are_explained() {
         (with_frame(", \"cx\": 4"), "`cx` is there but `cy` is missing"),
         (with_frame(", \"K\": [1, 2]"), "`K` must have 3x3 numbers, found 2"),
         (with_frame(", \"k1\": []"), "`k1` must be a number, found a list of 0"),
-        (with_file(", \"camera_model\": \"OPENCV_FISHEYE\""), "OPENCV_FISHEYE is not supported yet"),
+        (with_file(", \"camera_model\": \"THIN_PRISM\""), "THIN_PRISM is not supported yet"),
         (with_file(", \"is_fisheye\": true"), "`is_fisheye` cameras are not supported yet"),
         (with_file(", \"aabb_scale\": -4"), "`aabb_scale` must be above 0"),
         (with_file(", \"aabb\": [1, 2]"), "`aabb` must be"),

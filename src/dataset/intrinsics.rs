@@ -204,6 +204,12 @@ fn compare_with_angle(fields: Fields, focal: Measure, owner: &str, notes: &mut N
 }
 
 fn lens(fields: Fields) -> Result<Option<Lens>> {
+    let model = fields.text("camera_model")?.unwrap_or_default().to_uppercase();
+    match model.as_str() {
+        "ORTHOGRAPHIC" => return Ok(Some(Lens::Orthographic)),
+        "EQUIRECTANGULAR" => return Ok(Some(Lens::Equirectangular)),
+        _ => {}
+    }
     const KEYS: [&str; 6] = ["k1", "k2", "k3", "k4", "p1", "p2"];
     let mut values = [0.0; 6];
     if let Some(list) = fields.numbers("distortion_params")? {
@@ -221,6 +227,9 @@ fn lens(fields: Fields) -> Result<Option<Lens>> {
         return Ok(None);
     }
     let [k1, k2, k3, k4, p1, p2] = values;
+    if model == "OPENCV_FISHEYE" {
+        return Ok(Some(Lens::Fisheye { k: [k1, k2, k3, k4] }));
+    }
     if values == [0.0; 6] {
         return Ok(Some(Lens::Pinhole));
     }
@@ -228,8 +237,18 @@ fn lens(fields: Fields) -> Result<Option<Lens>> {
 }
 
 fn refuse_other_projections(layers: &[Fields]) -> Result<()> {
-    const ACCEPTED: [&str; 7] =
-        ["PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "OPENCV", "SIMPLE_RADIAL", "RADIAL", "BROWN"];
+    const ACCEPTED: [&str; 10] = [
+        "PINHOLE",
+        "SIMPLE_PINHOLE",
+        "PERSPECTIVE",
+        "OPENCV",
+        "SIMPLE_RADIAL",
+        "RADIAL",
+        "BROWN",
+        "OPENCV_FISHEYE",
+        "ORTHOGRAPHIC",
+        "EQUIRECTANGULAR",
+    ];
     for fields in layers {
         if let Some(model) = fields.text("camera_model")? {
             ensure!(
