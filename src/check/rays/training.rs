@@ -107,6 +107,9 @@ impl Images {
                 DVec2::new(f64::from(texel % camera.width) + 0.5, f64::from(texel / camera.width) + 0.5);
             if let Some(want) = camera.ray(pixel).filter(|_| !is_close_to_a_fold(camera, pixel)) {
                 tally.each(&case, &ray.direction.to_array(), &want.direction.to_array(), |_| 1.0);
+                let origin = (want.origin - bounds().min()) / (2.0 * bounds().outer_half());
+                let size = 1.0 + origin.abs().max_element();
+                tally.each(&format!("{case}, origin"), &ray.origin.to_array(), &origin.to_array(), |_| size);
             }
             let behind = match bench.plan.config.background {
                 Background::Random => {
