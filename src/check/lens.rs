@@ -3,17 +3,18 @@
 use super::draw::Random;
 use super::probe::Probe;
 use super::{Subject, Tally};
+use crate::camera::Lens;
 use crate::kernels::{CAMERA, RAY, SINE};
-use crate::reference::lens::{Distortion, Fisheye};
+use crate::reference::lens::{self, Distortion, Fisheye};
 use anyhow::Result;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 /// All of it.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
 pub fn lens_models(subject: &Subject) -> Result<Vec<Tally>> {
-    Ok(vec![points_and_slopes(subject)?, sines(subject)?])
+    Ok(vec![points_and_slopes(subject)?, undistorted_points(subject)?, sines(subject)?])
 }
 
 /// What OpenCV's models add to a point, and their slopes, for coefficients far stronger than any that are built.
@@ -46,6 +47,79 @@ fn points_and_slopes(subject: &Subject) -> Result<Tally> {
         compare(&mut tally, vector([second[2], second[3]]), want, size, || format!("{lens:?} at {theta}"));
     }
     Ok(tally)
+}
+
+/// Ordinary lenses, strong ones, and ones that fold within the image.
+const LENSES: [Lens; 10] = [
+    Lens::OpenCv { k: [0.05, -0.08, 0.02, 0.0], p: [1e-3, -5e-4] },
+    Lens::OpenCv { k: [-0.27, 0.11, -0.03, 0.004], p: [2e-3, 1e-3] },
+    Lens::OpenCv { k: [-0.36, 0.18, -0.045, 0.0045], p: [-2e-3, 3e-3] },
+    Lens::OpenCv { k: [-0.45, 0.05, 0.0, 0.0], p: [1e-3, 2e-3] },
+    Lens::OpenCv { k: [0.35, 0.12, 0.01, 0.0], p: [-3e-3, 2e-3] },
+    Lens::Fisheye { k: [0.0; 4] },
+    Lens::Fisheye { k: [-0.02, 0.003, -0.0004, 0.00002] },
+    Lens::Fisheye { k: [-0.1, 0.0, 0.0, 0.0] },
+    Lens::Fisheye { k: [-0.1, 0.08, -0.022, 0.0019] },
+    Lens::Fisheye { k: [0.2, 0.1, 0.02, 0.0] },
+];
+/// Size and focal lengths, OpenCV's and the fisheye's, of the image that round trips cover, in pixels.
+const IMAGE: [f64; 2] = [1000.0, 750.0];
+const FOCAL_PX: [f64; 2] = [810.0, 310.0];
+
+/// Points all over an image through the inverse of the lens and back through the reference's lens, in pixels.
+fn undistorted_points(subject: &Subject) -> Result<Tally> {
+    let mut tally =
+        Tally::new("lens: round trips, pixels", 1e-4, "a point on the plane rounds; 1000 pixels are across");
+    let body = "var camera: Camera;\n\
+                camera.radial = input(1u);\n\
+                camera.tangential = input(2u).xy;\n\
+                camera.rim = input(2u).z;\n\
+                var seen = opencv_ray(camera, input(0u).xy);\n\
+                if input(2u).w > 0.0 {\n\
+                    seen = fisheye_ray(camera, input(0u).xy);\n\
+                }\n\
+                output(0u, vec4(seen.direction, select(0.0, 1.0, seen.exists)));";
+    for lens in LENSES {
+        let (focal_px, inputs) = image_of(lens);
+        let outputs = Probe { parts: &[CAMERA, RAY], body }.evaluate::<3, 1>(subject, &inputs)?;
+        let mut seen = 0;
+        for (input, [[x, y, z, exists]]) in inputs.iter().zip(outputs) {
+            let plane = vector([input[0][0], input[0][1]]);
+            let case = || format!("{lens:?} at {plane}");
+            // Where rounding decides whether there is a ray, either answer will do.
+            let [inside, outside] = [1.03, 0.97].map(|scale| lens::ray(&lens, plane * scale).is_some());
+            if inside != outside {
+                continue;
+            }
+            tally.holds((exists > 0.0) == inside, || format!("{}: is there a ray?", case()));
+            if inside && exists > 0.0 {
+                seen += 1;
+                let back = lens::image(&lens, DVec3::from_array([x, y, z].map(f64::from)));
+                tally.error(focal_px * (back - plane).length(), || format!("{}: back at {back}", case()));
+            }
+        }
+        tally.holds(seen > 1000, || format!("{lens:?}: only {seen} rays"));
+    }
+    Ok(tally)
+}
+
+/// Every 11th pixel of an image, as points on the lens's plane, with its coefficients and its rim.
+fn image_of(lens: Lens) -> (f64, Vec<[[f32; 4]; 3]>) {
+    let (k, p, is_fisheye) = match lens {
+        Lens::OpenCv { k, p } => (k, p, 0.0),
+        Lens::Fisheye { k } => (k, [0.0; 2], 1.0),
+        _ => ([0.0; 4], [0.0; 2], 0.0),
+    };
+    let focal_px = FOCAL_PX[is_fisheye as usize];
+    let rim = lens.rim().unwrap_or_default();
+    let narrow = |values: [f64; 4]| values.map(|value| value as f32);
+    let [columns, rows] = IMAGE.map(|pixels| (pixels / 11.0) as u32);
+    let point = |index: u32| {
+        let pixel = DVec2::new(f64::from(index % columns), f64::from(index / columns)) * 11.0 + 0.5;
+        let plane = (pixel - 0.5 * DVec2::from_array(IMAGE)) / focal_px;
+        [narrow([plane.x, plane.y, 0.0, 0.0]), narrow(k), narrow([p[0], p[1], rim, is_fisheye])]
+    };
+    (focal_px, (0..columns * rows).map(point).collect())
 }
 
 /// A point and p1, p2; k1 to k4.
