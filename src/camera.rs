@@ -4,7 +4,15 @@
 //! the top-left corner of the image, +x right and +y down; the centre of pixel `(i, j)` is
 //! `(i + 0.5, j + 0.5)`.
 
-use glam::{DAffine3, DMat2, DVec2, DVec3};
+mod equirectangular;
+mod fisheye;
+mod lens;
+mod open_cv;
+
+pub use lens::{Lens, LensKind};
+
+use glam::{DAffine3, DVec2, DVec3};
+use lens::LensRay;
 use serde::{Deserialize, Serialize};
 
 /// One camera. Lengths are in world units, image quantities in pixels.
@@ -14,38 +22,21 @@ pub struct Camera {
     pub width: u32,
     /// Image height in pixels.
     pub height: u32,
-    /// Focal lengths along x and y, in pixels.
+    /// Focal lengths along x and y, in pixels; what they mean for a lens without focus is said at [`Lens`].
     pub focal_px: DVec2,
     /// Principal point, in pixels from the top-left corner.
     pub center_px: DVec2,
-    /// Distortion applied by the lens.
+    /// How directions are mapped to the image.
     pub lens: Lens,
-    /// Camera-to-world pose: a rotation (orthonormal, determinant +1) and a translation.
+    /// Camera-to-world pose: an orthonormal matrix and a translation. The matrix is improper (determinant -1)
+    /// where the dataset's world is left-handed.
     pub world_from_camera: DAffine3,
-}
-
-/// How a lens bends the ideal pinhole projection.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Lens {
-    /// No distortion.
-    #[default]
-    Pinhole,
-    /// OpenCV's radial-tangential model:
-    /// `x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸) + 2 p1 x y + p2 (r² + 2 x²)` and
-    /// `y_d = y (1 + …) + p1 (r² + 2 y²) + 2 p2 x y`, with y pointing down.
-    OpenCv {
-        /// Radial coefficients k1..k4.
-        k: [f64; 4],
-        /// Tangential coefficients p1, p2.
-        p: [f64; 2],
-    },
 }
 
 /// A ray in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where the ray starts: the camera's position.
+    /// Where the ray starts: the camera's position, or for parallel rays a point of the image plane.
     pub origin: DVec3,
     /// Unit direction.
     pub direction: DVec3,
@@ -53,31 +44,22 @@ pub struct Ray {
 
 impl Camera {
     /// The world-space ray through a point of the image (pixel space), or `None` where the lens maps
-    /// no direction to that point (beyond the rim of a strong distortion).
+    /// no direction to that point (beyond its rim, or off the sphere).
     pub fn ray(&self, pixel: DVec2) -> Option<Ray> {
-        let plane = self.lens.undistort((pixel - self.center_px) / self.focal_px)?;
-        let direction = DVec3::new(plane.x, -plane.y, -1.0);
+        let LensRay { offset, direction } = self.lens.ray((pixel - self.center_px) / self.focal_px)?;
+        let pose = self.world_from_camera;
         Some(Ray {
-            origin: self.position(),
-            direction: self.world_from_camera.transform_vector3(direction).normalize(),
+            origin: pose.transform_point3(offset),
+            direction: pose.transform_vector3(direction).normalize(),
         })
     }
 
-    /// Where a world-space point appears in pixel space, and its depth along the view axis in world
-    /// units; `None` behind the camera and where the lens model folds over. The point may lie outside
-    /// the image.
+    /// Where a world-space point appears in pixel space, and its depth in world units, along the view axis or
+    /// along the ray as [`Lens::depth_is_distance`] says; `None` where the lens does not see the point: behind
+    /// the camera, beyond the rim. The point may lie outside the image.
     pub fn project(&self, world: DVec3) -> Option<(DVec2, f64)> {
-        let camera = self.world_from_camera.inverse().transform_point3(world);
-        let depth = -camera.z;
-        if depth.is_nan() || depth <= 0.0 {
-            return None;
-        }
-        let plane = DVec2::new(camera.x, -camera.y) / depth;
-        let bent = self.lens.distort(plane);
-        // A polynomial lens brings points far outside the field of view back into the image.
-        let back = self.lens.undistort(bent)?;
-        (back.distance(plane) <= 1e-6 * (1.0 + plane.length()))
-            .then(|| (bent * self.focal_px + self.center_px, depth))
+        let (plane, depth) = self.lens.image(self.world_from_camera.inverse().transform_point3(world))?;
+        Some((plane * self.focal_px + self.center_px, depth))
     }
 
     /// Unit view direction in world space.
@@ -85,7 +67,7 @@ impl Camera {
         -self.world_from_camera.matrix3.z_axis
     }
 
-    /// Centre of projection in world space.
+    /// Centre of projection in world space; for parallel rays the principal point on the image plane.
     pub fn position(&self) -> DVec3 {
         self.world_from_camera.translation
     }
@@ -98,110 +80,28 @@ impl Camera {
     }
 }
 
-impl Lens {
-    /// From the ideal to the distorted point; both on the normalised image plane, y down.
-    pub fn distort(&self, ideal: DVec2) -> DVec2 {
-        match self {
-            Self::Pinhole => ideal,
-            Self::OpenCv { k, p } => {
-                let r2 = ideal.length_squared();
-                let radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * (k[2] + r2 * k[3])));
-                let xy = ideal.x * ideal.y;
-                ideal * radial
-                    + DVec2::new(
-                        2.0 * p[0] * xy + p[1] * (r2 + 2.0 * ideal.x * ideal.x),
-                        p[0] * (r2 + 2.0 * ideal.y * ideal.y) + 2.0 * p[1] * xy,
-                    )
-            }
-        }
-    }
-
-    /// From the distorted to the ideal point, the inverse of [`Lens::distort`] on the region around the
-    /// optical axis where the model is one-to-one; `None` for points that region does not reach.
-    pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
-        if *self == Self::Pinhole {
-            return Some(distorted);
-        }
-        // The solution is followed from the axis (where ideal = distorted = 0) outwards, in one stride
-        // for ordinary lenses and in shorter ones near a fold: Newton from the far end alone may land on
-        // a branch beyond the fold.
-        let mut ideal = DVec2::ZERO;
-        let mut reached = 0.0;
-        let mut stride = 1.0;
-        while reached < 1.0 {
-            let next = f64::min(reached + stride, 1.0);
-            match self.newton(ideal, distorted * reached, distorted * next) {
-                Some(solution) => {
-                    ideal = solution;
-                    reached = next;
-                    stride *= 2.0;
-                }
-                None => stride *= 0.5,
-            }
-            if stride < 1e-6 {
-                return None;
-            }
-        }
-        Some(ideal)
-    }
-
-    /// Solves `distort(x) = target` from the known solution `start` of `distort(start) = origin`, or
-    /// gives up when the solution is not safely on the branch of `start`.
-    fn newton(&self, start: DVec2, origin: DVec2, target: DVec2) -> Option<DVec2> {
-        let slope_at_start = self.jacobian(start);
-        let predicted_step = slope_at_start.inverse() * (target - origin);
-        let mut ideal = start + predicted_step;
-        let mut last_step = f64::INFINITY;
-        for _ in 0..12 {
-            let slope = self.jacobian(ideal);
-            let determinant = slope.determinant();
-            if determinant.is_nan() || determinant <= 0.05 * slope_at_start.determinant() {
-                return None;
-            }
-            let step = slope.inverse() * (target - self.distort(ideal));
-            ideal += step;
-            if ideal.distance(start + predicted_step) > 0.5 * predicted_step.length() + 1e-15 {
-                return None;
-            }
-            let size = step.length();
-            if size <= 4e-16 * (1.0 + ideal.length()) || (size >= last_step && size < 1e-13) {
-                return Some(ideal);
-            }
-            last_step = size;
-        }
-        None
-    }
-
-    /// Derivative of [`Lens::distort`].
-    fn jacobian(&self, ideal: DVec2) -> DMat2 {
-        match self {
-            Self::Pinhole => DMat2::IDENTITY,
-            Self::OpenCv { k, p } => {
-                let DVec2 { x, y } = ideal;
-                let r2 = ideal.length_squared();
-                let radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * (k[2] + r2 * k[3])));
-                let d_radial = 2.0 * (k[0] + r2 * (2.0 * k[1] + r2 * (3.0 * k[2] + r2 * 4.0 * k[3])));
-                let mixed = d_radial * x * y + 2.0 * (p[0] * x + p[1] * y);
-                DMat2::from_cols(
-                    DVec2::new(radial + d_radial * x * x + 2.0 * p[0] * y + 6.0 * p[1] * x, mixed),
-                    DVec2::new(mixed, radial + d_radial * y * y + 6.0 * p[0] * y + 2.0 * p[1] * x),
-                )
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::DQuat;
+    use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
     fn camera(lens: Lens) -> Camera {
+        let (width, height) = (1080, 1920);
+        let focal = match lens.kind() {
+            LensKind::Pinhole | LensKind::OpenCv => DVec2::new(1375.5, 1371.2),
+            // The corners lie 100 degrees off the axis where θ_d = θ.
+            LensKind::Fisheye => DVec2::splat(1101.5 / 100f64.to_radians()),
+            LensKind::Orthographic => DVec2::new(402.0, 395.0),
+            LensKind::Equirectangular => DVec2::new(f64::from(width) / TAU, f64::from(height) / PI),
+        };
+        let half = DVec2::new(0.5 * f64::from(width), 0.5 * f64::from(height));
+        let is_whole_sphere = lens == Lens::Equirectangular;
         Camera {
-            width: 1080,
-            height: 1920,
-            focal_px: DVec2::new(1375.5, 1371.2),
-            center_px: DVec2::new(554.6, 965.3),
+            width,
+            height,
+            focal_px: focal,
+            center_px: if is_whole_sphere { half } else { DVec2::new(554.6, 965.3) },
             lens,
             world_from_camera: DAffine3::from_rotation_translation(
                 DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.3),
@@ -210,73 +110,156 @@ mod tests {
         }
     }
 
-    fn lenses() -> Vec<Lens> {
-        let open_cv = |k, p| Lens::OpenCv { k, p };
+    /// With the share of the image in which they have rays.
+    fn lenses() -> Vec<(Lens, f64)> {
+        let open_cv = |k, p| (Lens::OpenCv { k, p }, 1.0);
         vec![
-            Lens::Pinhole,
+            (Lens::Pinhole, 1.0),
             open_cv([0.0578, -0.0805, 0.0, 0.0], [-9.8e-4, 1.6e-4]),
             open_cv([-0.35, 0.15, -0.03, 0.0], [0.003, -0.002]),
             open_cv([0.48, 0.9, 0.3, 0.1], [0.02, -0.01]),
             open_cv([-0.15, 0.0, 0.0, 0.0], [0.0, 0.0]),
+            (Lens::OpenCv { k: [-0.45, 0.05, 0.0, 0.0], p: [1e-3, 2e-3] }, 0.8),
+            (Lens::Fisheye { k: [0.0; 4] }, 1.0),
+            (Lens::Fisheye { k: [-0.02, 0.003, -0.0006, 0.00001] }, 1.0),
+            (Lens::Fisheye { k: [0.4, 0.2, 0.1, 0.05] }, 1.0),
+            (Lens::Fisheye { k: [-0.25, 0.02, 0.0, 0.0] }, 0.5),
+            (Lens::Orthographic, 1.0),
+            (Lens::Equirectangular, 1.0),
         ]
+    }
+
+    /// Every seventh pixel of both axes in full size, and all pixels of the first and last rows.
+    fn pixels(camera: &Camera) -> impl Iterator<Item = DVec2> {
+        let (width, height) = (camera.width, camera.height);
+        let rows = (0..height).filter(move |y| y % 7 == 0 || *y == height - 1);
+        let all = rows.flat_map(move |y| (0..width).map(move |x| (x, y)));
+        all.filter(move |(x, y)| x % 7 == 0 || *y == 0 || *y == height - 1 || *x == width - 1)
+            .map(|(x, y)| DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
     }
 
     #[test]
     fn a_ray_projects_back_onto_its_pixel() {
-        for lens in lenses() {
-            let camera = camera(lens);
-            for (i, j) in (0..=20).flat_map(|i| (0..=20).map(move |j| (i, j))) {
-                let pixel = DVec2::new(f64::from(i) * 54.0, f64::from(j) * 96.0);
-                let ray = camera.ray(pixel).expect("inside the lens");
+        // A left-handed world mirrors the rays along with its points.
+        for ((lens, share), hand) in lenses().into_iter().zip([1.0, -1.0].into_iter().cycle()) {
+            let mut camera = camera(lens);
+            camera.world_from_camera.matrix3.y_axis *= hand;
+            let (mut count, mut seen) = (0, 0);
+            for pixel in pixels(&camera) {
+                count += 1;
+                let Some(ray) = camera.ray(pixel) else { continue };
+                seen += 1;
+                assert!((ray.direction.length() - 1.0).abs() < 1e-14);
                 let (back, depth) = camera.project(ray.origin + 7.0 * ray.direction).expect("in front");
-                assert!(back.distance(pixel) < 1e-8, "{lens:?} {pixel} -> {back}");
-                assert!((depth - 7.0 * ray.direction.dot(camera.forward())).abs() < 1e-12);
+                assert!(back.distance(pixel) < 1e-6, "{lens:?} {pixel} -> {back}");
+                let along = if lens.depth_is_distance() { 1.0 } else { ray.direction.dot(camera.forward()) };
+                assert!((depth - 7.0 * along).abs() < 1e-12, "{lens:?} {depth}");
             }
+            let found = f64::from(seen) / f64::from(count);
+            assert!(found <= share && found > share - 0.2, "{lens:?}: {found} of the pixels have rays");
         }
     }
 
     #[test]
     fn beyond_the_rim_of_a_lens_there_is_no_ray() {
         // r (1 - 0.4 r²) peaks at r = 0.9129 with the value 0.6086.
-        let lens = Lens::OpenCv { k: [-0.4, 0.0, 0.0, 0.0], p: [0.0; 2] };
-        assert!(lens.undistort(DVec2::new(0.608, 0.0)).is_some());
-        assert_eq!(lens.undistort(DVec2::new(0.609, 0.0)), None);
-        assert_eq!(lens.undistort(DVec2::new(f64::NAN, 0.0)), None);
-        let camera = camera(lens);
-        let folded = DVec3::new(1.3, 0.0, -1.0);
-        assert_eq!(camera.project(camera.world_from_camera.transform_point3(folded)), None);
-    }
-
-    #[test]
-    fn the_jacobian_is_the_derivative() {
-        let at = DVec2::new(0.31, -0.22);
-        for lens in lenses() {
-            let analytic = lens.jacobian(at);
-            for (axis, column) in [(DVec2::X, analytic.x_axis), (DVec2::Y, analytic.y_axis)] {
-                let h = 1e-6;
-                let slope = (lens.distort(at + h * axis) - lens.distort(at - h * axis)) / (2.0 * h);
-                assert!(slope.distance(column) < 1e-8, "{lens:?}");
-            }
+        let camera = camera(Lens::OpenCv { k: [-0.4, 0.0, 0.0, 0.0], p: [0.0; 2] });
+        let seen =
+            |camera: &Camera, plane: DVec2| camera.ray(camera.center_px + plane * camera.focal_px).is_some();
+        assert!(seen(&camera, DVec2::new(0.608, 0.0)) && !seen(&camera, DVec2::new(0.609, 0.0)));
+        let project = |camera: &Camera, x: f64, y: f64, z: f64| {
+            camera.project(camera.world_from_camera.transform_point3(DVec3::new(x, y, z)))
+        };
+        assert_eq!(project(&camera, 1.3, 0.0, -1.0), None);
+        // θ (1 - 0.1 θ²) peaks at θ = 1.8257 with the value 1.2172.
+        let fisheye = super::tests::camera(Lens::Fisheye { k: [-0.1, 0.0, 0.0, 0.0] });
+        assert!(seen(&fisheye, DVec2::new(0.0, 1.217)) && !seen(&fisheye, DVec2::new(0.0, 1.218)));
+        let at = |theta: f64| project(&fisheye, -theta.sin(), 0.0, -theta.cos());
+        assert!(at(1.82).is_some() && at(1.83).is_none());
+        // Without distortion, straight back is the last circle.
+        let round = super::tests::camera(Lens::Fisheye { k: [0.0; 4] });
+        assert!(seen(&round, DVec2::new(-3.14, 0.0)) && !seen(&round, DVec2::new(-3.15, 0.0)));
+        let sphere = super::tests::camera(Lens::Equirectangular);
+        assert!(seen(&sphere, DVec2::new(3.14, -1.57)));
+        assert!(!seen(&sphere, DVec2::new(3.15, 0.0)) && !seen(&sphere, DVec2::new(0.0, 1.58)));
+        for lens in [camera.clone(), fisheye, round, sphere] {
+            assert_eq!(lens.project(lens.position()), None);
+            let unknown = lens.ray(DVec2::NAN);
+            assert!(unknown.is_none(), "{unknown:?}");
         }
     }
 
     #[test]
     fn axes_point_right_down_and_forward() {
-        let mut camera = camera(Lens::Pinhole);
+        for (lens, _) in lenses() {
+            let mut camera = camera(lens);
+            camera.world_from_camera = DAffine3::IDENTITY;
+            let middle = camera.ray(camera.center_px).expect("on the axis");
+            assert!(middle.direction.distance(-DVec3::Z) < 1e-14 && middle.origin == DVec3::ZERO);
+            let point = |pixel| {
+                let ray = camera.ray(camera.center_px + pixel).expect("near the axis");
+                ray.origin + ray.direction
+            };
+            assert!(point(DVec2::X).x > 0.0 && point(DVec2::Y).y < 0.0, "{lens:?}");
+            assert_eq!(camera.forward(), -DVec3::Z);
+            let behind = camera.project(DVec3::new(0.0, 1e-9, 1.0));
+            let sees_behind = match lens {
+                Lens::Fisheye { k } => k[0] >= 0.0,
+                other => other == Lens::Equirectangular,
+            };
+            assert_eq!(behind.is_some(), sees_behind, "{lens:?}");
+        }
+    }
+
+    #[test]
+    fn a_sphere_is_unrolled_from_its_middle() {
+        let mut camera = camera(Lens::Equirectangular);
         camera.world_from_camera = DAffine3::IDENTITY;
-        let right = camera.ray(camera.center_px + DVec2::X).expect("pinhole");
-        let down = camera.ray(camera.center_px + DVec2::Y).expect("pinhole");
-        assert!(right.direction.x > 0.0 && down.direction.y < 0.0);
-        assert_eq!(camera.forward(), -DVec3::Z);
-        assert_eq!(camera.project(DVec3::Z), None);
+        let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
+        let seen = |x: f64, y: f64| camera.ray(DVec2::new(x, y) * size).expect("on the sphere").direction;
+        for (at, direction) in [
+            (seen(0.5, 0.5), DVec3::NEG_Z),
+            (seen(0.75, 0.5), DVec3::X),
+            (seen(0.25, 0.5), DVec3::NEG_X),
+            (seen(0.0, 0.5), DVec3::Z),
+            (seen(1.0, 0.5), DVec3::Z),
+            (seen(0.3, 0.0), DVec3::Y),
+            (seen(0.3, 1.0), DVec3::NEG_Y),
+        ] {
+            assert!(at.distance(direction) < 1e-14, "{at} {direction}");
+        }
+    }
+
+    #[test]
+    fn a_fisheye_sees_angles_as_lengths() {
+        let mut camera = camera(Lens::Fisheye { k: [0.1, 0.0, 0.0, 0.0] });
+        camera.world_from_camera = DAffine3::IDENTITY;
+        let (pixel, depth) = camera.project(DVec3::new(0.0, -3.0, 0.0)).expect("a right angle");
+        let radius = FRAC_PI_2 * (1.0 + 0.1 * FRAC_PI_2 * FRAC_PI_2);
+        assert!(pixel.distance(camera.center_px + radius * camera.focal_px * DVec2::Y) < 1e-9);
+        assert!((depth - 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn parallel_rays_start_side_by_side() {
+        let camera = camera(Lens::Orthographic);
+        let ray = |x: f64, y: f64| camera.ray(camera.center_px + DVec2::new(x, y)).expect("everywhere");
+        let (right, down) = (ray(402.0, 0.0), ray(0.0, 395.0));
+        let axes = camera.world_from_camera.matrix3;
+        assert!(right.origin.distance(camera.position() + axes.x_axis) < 1e-12);
+        assert!(down.origin.distance(camera.position() - axes.y_axis) < 1e-12);
+        assert_eq!(right.direction, down.direction);
     }
 
     #[test]
     fn a_resized_camera_sees_the_same() {
-        let camera = camera(lenses()[1]);
-        let small = camera.resized(270, 480);
-        let full = camera.ray(DVec2::new(100.0, 200.0)).expect("inside");
-        let quarter = small.ray(DVec2::new(25.0, 50.0)).expect("inside");
-        assert!(full.direction.distance(quarter.direction) < 1e-14);
+        for (lens, _) in lenses() {
+            let camera = camera(lens);
+            let small = camera.resized(270, 480);
+            let full = camera.ray(DVec2::new(300.0, 700.0)).expect("inside");
+            let quarter = small.ray(DVec2::new(75.0, 175.0)).expect("inside");
+            assert!(full.direction.distance(quarter.direction) < 1e-14);
+            assert!(full.origin.distance(quarter.origin) < 1e-14);
+        }
     }
 }

@@ -175,8 +175,8 @@ impl View<'_> {
         let seen = world_from_camera.matrix3.transpose() * direction;
         let ideal = DVec2::new(seen.x, -seen.y) / -seen.z;
         let distorted = match *lens {
-            Lens::Pinhole => ideal,
             Lens::OpenCv { k, p } => Distortion { k, p }.distort(ideal),
+            _ => ideal,
         };
         distorted * *focal_px + *center_px
     }

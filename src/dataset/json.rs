@@ -1,68 +1,26 @@
-//! JSON as capture tools write it: a byte-order mark and comments are tolerated, and every complaint
-//! names the key, what was expected and what was found.
+//! JSON as capture tools write it: every complaint names the key, what was expected and what was found.
+
+mod text;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::{Map, Value};
 
-/// Parses a document whose top level is an object.
-pub(super) fn parse(text: &str) -> Result<Map<String, Value>> {
-    let text = without_comments(text.strip_prefix('\u{feff}').unwrap_or(text))?;
-    match serde_json::from_str(&text).context("not valid JSON")? {
-        Value::Object(map) => Ok(map),
-        other => bail!("expected a JSON object with a list `frames`, found {}", describe(&other)),
-    }
+/// Decodes the bytes of a file into text.
+pub(super) fn decode(bytes: &[u8]) -> Result<String> {
+    text::decode(bytes)
 }
 
-/// Blanks out `//` and `/* */` comments, keeping every line and column, and refuses the non-numbers that
-/// JSON cannot express but some writers emit.
-fn without_comments(text: &str) -> Result<String> {
-    let mut output = String::with_capacity(text.len());
-    let mut rest = text;
-    while let Some(first) = rest.chars().next() {
-        let (length, keep) = if first == '"' {
-            (string_length(rest), true)
-        } else if rest.starts_with("//") {
-            (rest.find('\n').unwrap_or(rest.len()), false)
-        } else if rest.starts_with("/*") {
-            (rest.find("*/").map_or(rest.len(), |end| end + 2), false)
-        } else if first.is_alphabetic() {
-            let end = rest.find(|c: char| !c.is_alphanumeric());
-            (end.unwrap_or(rest.len()), true)
+/// Parses a document.
+pub(super) fn parse(text: &str) -> Result<Value> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    text::refuse_strangers(text)?;
+    serde_json::from_str(&text::strict(text)).map_err(|error| {
+        if error.is_eof() {
+            anyhow::anyhow!("not valid JSON: {error}; the file ends too early, copy or write it again")
         } else {
-            (first.len_utf8(), true)
-        };
-        let (token, tail) = rest.split_at(length);
-        if keep {
-            let lower = token.to_ascii_lowercase();
-            if ["nan", "inf", "infinity"].contains(&lower.as_str()) {
-                let line = 1 + output.matches('\n').count();
-                let column = 1 + output.len() - output.rfind('\n').map_or(0, |at| at + 1);
-                bail!(
-                    "expected a finite number, found `{token}` at line {line} column {column}; \
-                     drop that frame or repair the tool that wrote it"
-                );
-            }
-            output.push_str(token);
-        } else {
-            output.extend(token.chars().map(|c| if c == '\n' { '\n' } else { ' ' }));
+            anyhow::anyhow!("not valid JSON: {error}; repair that place")
         }
-        rest = tail;
-    }
-    Ok(output)
-}
-
-/// Length of the string literal at the start of `text`, quotes included.
-fn string_length(text: &str) -> usize {
-    let mut escaped = false;
-    for (at, c) in text.char_indices().skip(1) {
-        match c {
-            _ if escaped => escaped = false,
-            '\\' => escaped = true,
-            '"' => return at + 1,
-            _ => {}
-        }
-    }
-    text.len()
+    })
 }
 
 /// What a value is, for messages.
@@ -71,9 +29,26 @@ pub(super) fn describe(value: &Value) -> String {
         Value::Null => "null".into(),
         Value::Bool(flag) => format!("{flag}"),
         Value::Number(number) => format!("the number {number}"),
-        Value::String(text) => format!("the text {:?}", text.chars().take(40).collect::<String>()),
+        Value::String(text) => format!("the text {:?}", shortened(text)),
         Value::Array(list) => format!("a list of {}", list.len()),
         Value::Object(_) => "an object".into(),
+    }
+}
+
+/// The start of a text that a stranger wrote, short enough for a message.
+pub(super) fn shortened(text: &str) -> String {
+    match text.char_indices().nth(100) {
+        None => text.to_owned(),
+        Some((end, _)) => format!("{}…", &text[..end]),
+    }
+}
+
+/// A number, also where it is written as text; NaN and infinities included.
+fn real(value: &Value) -> Option<f64> {
+    match value {
+        Value::Number(number) => number.as_f64(),
+        Value::String(text) => text.trim().parse().ok(),
+        _ => None,
     }
 }
 
@@ -90,15 +65,19 @@ impl<'a> Fields<'a> {
         keys.iter().any(|key| self.get(key).is_some())
     }
 
+    /// The objects among some keys.
+    pub(super) fn objects(self, keys: &[&str]) -> impl Iterator<Item = Self> {
+        keys.iter().filter_map(move |key| self.get(key)?.as_object()).map(Self)
+    }
+
     pub(super) fn number(self, key: &str) -> Result<Option<f64>> {
         let Some(value) = self.get(key) else {
             return Ok(None);
         };
-        let number = value.as_f64().filter(|number| number.is_finite());
-        match number {
-            Some(number) => Ok(Some(number)),
-            None => bail!("`{key}` must be a number, found {}", describe(value)),
-        }
+        let number =
+            real(value).with_context(|| format!("`{key}` must be a number, found {}", describe(value)))?;
+        ensure!(number.is_finite(), "`{key}` must be a finite number, found {number}");
+        Ok(Some(number))
     }
 
     /// A number above zero and below `limit`.
@@ -122,11 +101,11 @@ impl<'a> Fields<'a> {
     }
 
     /// True, false, or a number that is 0 or not.
-    pub(super) fn flag(self, key: &str) -> Result<bool> {
+    pub(super) fn flag(self, key: &str) -> Result<Option<bool>> {
         match self.get(key) {
-            None => Ok(false),
-            Some(Value::Bool(flag)) => Ok(*flag),
-            Some(Value::Number(number)) => Ok(number.as_f64() != Some(0.0)),
+            None => Ok(None),
+            Some(Value::Bool(flag)) => Ok(Some(*flag)),
+            Some(Value::Number(number)) => Ok(Some(number.as_f64() != Some(0.0))),
             Some(other) => bail!("`{key}` must be true or false, found {}", describe(other)),
         }
     }
@@ -139,26 +118,45 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// The numbers of a possibly nested list, one after the other.
+    /// A list of finite numbers, possibly nested.
     pub(super) fn numbers(self, key: &str) -> Result<Option<Vec<f64>>> {
+        let Some(Matrix { numbers, .. }) = self.matrix(key)? else {
+            return Ok(None);
+        };
+        ensure!(numbers.iter().all(|number| number.is_finite()), "`{key}` must have finite numbers only");
+        Ok(Some(numbers))
+    }
+
+    /// A list of numbers, flat or in rows; what is not finite or null is NaN or infinite.
+    pub(super) fn matrix(self, key: &str) -> Result<Option<Matrix>> {
         let Some(value) = self.get(key) else {
             return Ok(None);
         };
-        let mut numbers = Vec::new();
-        flatten(value, &mut numbers).with_context(|| format!("`{key}` must be a list of numbers"))?;
-        Ok(Some(numbers))
+        let Value::Array(rows) = value else {
+            bail!("`{key}` must be a list of numbers, found {}", describe(value));
+        };
+        let mut numbers = Vec::with_capacity(16);
+        flatten(rows, &mut numbers).with_context(|| format!("`{key}` must be a list of numbers"))?;
+        let columns = rows.first().and_then(Value::as_array).map(Vec::len);
+        Ok(Some(Matrix { rows: columns.map(|columns| [rows.len(), columns]), numbers }))
     }
 }
 
-fn flatten(value: &Value, numbers: &mut Vec<f64>) -> Result<()> {
-    match value {
-        Value::Array(list) => list.iter().try_for_each(|item| flatten(item, numbers)),
-        Value::Number(number) => {
-            numbers.push(number.as_f64().context("a number is out of range")?);
-            Ok(())
+/// Numbers, and the rows and columns that they were written in.
+pub(super) struct Matrix {
+    pub(super) rows: Option<[usize; 2]>,
+    pub(super) numbers: Vec<f64>,
+}
+
+fn flatten(list: &[Value], numbers: &mut Vec<f64>) -> Result<()> {
+    for value in list {
+        match value {
+            Value::Array(list) => flatten(list, numbers)?,
+            Value::Null => numbers.push(f64::NAN),
+            other => numbers.push(real(other).with_context(|| format!("found {} in it", describe(other)))?),
         }
-        other => bail!("found {} in it", describe(other)),
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -166,22 +164,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn comments_go_and_strings_stay() {
-        let text = "\u{feff}{ // one\n/* two\n */ \"a // b\": \"c \\\" /* d */\", \"nan\": 1 }";
-        let map = parse(text).expect("tolerated");
-        assert_eq!(map["a // b"], "c \" /* d */");
-        assert_eq!(map["nan"], 1);
+    fn numbers_may_be_text_and_must_be_finite() {
+        let value = parse("\u{feff}{\"a\": \" 1.5\", \"b\": NaN, \"c\": \"x\", \"d\": null}").expect("JSON");
+        let fields = Fields(value.as_object().expect("object"));
+        assert_eq!(fields.number("a").expect("a number"), Some(1.5));
+        assert_eq!(fields.number("d").expect("missing"), None);
+        for (key, expected) in [("b", "a finite number, found NaN"), ("c", "a number, found the text \"x\"")]
+        {
+            let message = fields.number(key).expect_err("refused").to_string();
+            assert!(message.contains(expected), "{message}");
+        }
     }
 
     #[test]
     fn errors_say_where() {
         for (text, expected) in [
-            ("{\n  \"a\": NaN}", "found `NaN` at line 2 column 8"),
-            ("{\"a\": [1, -Infinity]}", "found `Infinity` at line 1"),
             ("{\n/* x\n*/ \"a\": ,}", "line 3 column 9"),
-            ("{\"a\": 1e999}", "number out of range"),
-            ("[1, 2]", "found a list of 2"),
-            ("{\"a\": \"open", "line 1"),
+            ("{\"a\": \"open", "ends too early"),
+            ("  ", "an empty file"),
+            ("<!DOCTYPE html>", "a web page"),
+            ("version https://git-lfs.github.com/spec/v1", "git lfs pull"),
         ] {
             let message = format!("{:#}", parse(text).expect_err("refused"));
             assert!(message.contains(expected), "{message}");

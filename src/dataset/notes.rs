@@ -1,5 +1,6 @@
 //! What a reader of the dataset should know about how it was read.
 
+use std::collections::HashMap;
 use std::fmt;
 
 /// How much a [`Note`] matters.
@@ -27,10 +28,14 @@ impl fmt::Display for Note {
 }
 
 /// Collects notes; the same remark about many frames becomes one.
-#[derive(Debug, Default)]
-pub(super) struct Notes(Vec<Entry>);
+#[derive(Clone, Debug, Default)]
+pub(super) struct Notes {
+    entries: Vec<Entry>,
+    /// Where a remark is, by its wording without the numbers in it.
+    index: HashMap<String, usize>,
+}
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Entry {
     severity: Severity,
     message: String,
@@ -47,24 +52,33 @@ impl Notes {
         self.add(Severity::Warning, message.into(), None);
     }
 
-    /// A remark about one frame; it should not contain numbers that differ from frame to frame.
+    /// A remark about one frame. Remarks that differ in numbers only become one, with the first numbers.
     pub(super) fn frame(&mut self, severity: Severity, frame: &str, message: impl Into<String>) {
         self.add(severity, message.into(), Some(frame));
     }
 
     fn add(&mut self, severity: Severity, message: String, frame: Option<&str>) {
-        match self.0.iter_mut().find(|entry| entry.message == message) {
-            Some(entry) => entry.count += 1,
-            None => self.0.push(Entry { severity, message, first_frame: frame.map(Into::into), count: 1 }),
+        self.merge(Entry { severity, message, first_frame: frame.map(Into::into), count: 1 });
+    }
+
+    fn merge(&mut self, entry: Entry) {
+        let is_wording = |c: &char| !c.is_ascii_digit() && !matches!(c, '.' | '-');
+        let wording: String = match entry.first_frame {
+            Some(_) => entry.message.chars().filter(is_wording).collect(),
+            None => entry.message.clone(),
+        };
+        match self.index.get(&wording) {
+            Some(&at) => self.entries[at].count += entry.count,
+            None => {
+                self.index.insert(wording, self.entries.len());
+                self.entries.push(entry);
+            }
         }
     }
 
     pub(super) fn append(&mut self, other: Self) {
-        for entry in other.0 {
-            match self.0.iter_mut().find(|own| own.message == entry.message) {
-                Some(own) => own.count += entry.count,
-                None => self.0.push(entry),
-            }
+        for entry in other.entries {
+            self.merge(entry);
         }
     }
 
@@ -79,6 +93,29 @@ impl Notes {
                 }
             },
         };
-        self.0.into_iter().map(finish).collect()
+        self.entries.into_iter().map(finish).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_remark_about_many_frames_is_one() {
+        let mut notes = Notes::default();
+        notes.frame(Severity::Note, "frame 3", "the focal length is 1.5");
+        notes.frame(Severity::Note, "frame 4", "the focal length is 22");
+        notes.frame(Severity::Note, "frame 4", "the lens is odd");
+        notes.note("2 frames");
+        notes.note("3 frames");
+        let messages: Vec<_> = notes.finish().into_iter().map(|note| note.message).collect();
+        let expected = [
+            "frame 3 and 1 more: the focal length is 1.5",
+            "frame 4: the lens is odd",
+            "2 frames",
+            "3 frames",
+        ];
+        assert_eq!(messages, expected);
     }
 }

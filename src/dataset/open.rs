@@ -139,11 +139,7 @@ fn folder_of(file: &Path) -> PathBuf {
 }
 
 fn read(path: &Path) -> Result<Listing> {
-    let read = || {
-        let bytes = std::fs::read(path)?;
-        let text = String::from_utf8(bytes).ok();
-        transforms::parse(&text.context("expected UTF-8 text; save the file as UTF-8")?)
-    };
+    let read = || transforms::parse_bytes(&std::fs::read(path)?);
     read().with_context(|| format!("reading {}", path.display()))
 }
 
@@ -250,9 +246,9 @@ fn build(located: Vec<Located>, notes: &mut Notes) -> (Vec<Frame>, Vec<(Option<S
                 (path, size, false)
             }
         };
-        let (camera, rescaled) = entry.intrinsics.camera(size, entry.world_from_camera);
-        if let Some(rescaled) = rescaled {
-            notes.frame(Severity::Note, &entry.label, rescaled);
+        let (camera, remarks) = entry.intrinsics.camera(size, entry.world_from_camera);
+        for remark in remarks {
+            notes.frame(remark.severity, &entry.label, remark.message);
         }
         members.push((entry.split, canonical(&path)));
         frames.push(Frame { name: entry.file_path, path, camera, has_alpha });

@@ -1,77 +1,194 @@
-//! `transform_matrix`: a camera-to-world matrix in any of the shapes in use, made a rigid motion.
+//! Poses: a camera-to-world matrix in any of the shapes in use, made an orthonormal matrix and a
+//! translation.
 
-use anyhow::{Context, Result, ensure};
-use glam::{DAffine3, DMat3, DVec3};
+pub(super) mod handedness;
 
-use super::json::Fields;
+use anyhow::{Context, Result, bail, ensure};
+use glam::{DAffine3, DMat3, DMat4, DVec3};
+
+use super::json::{Fields, Matrix};
 use super::notes::{Notes, Severity};
 
-/// Reads the pose of a frame; `owner` names it in notes.
-pub(super) fn read(fields: Fields, owner: &str, notes: &mut Notes) -> Result<DAffine3> {
-    let numbers = fields
-        .numbers("transform_matrix")?
-        .context("`transform_matrix` is missing; every frame needs a camera-to-world matrix")?;
-    ensure!(
-        numbers.len() == 16 || numbers.len() == 12,
-        "`transform_matrix` must have 4x4 or 3x4 numbers, found {}",
-        numbers.len()
-    );
-    let at = |row: usize, column: usize| numbers[4 * row + column];
-    let weight = if numbers.len() == 16 {
-        let bottom = DVec3::new(at(3, 0), at(3, 1), at(3, 2));
-        let right = DVec3::new(at(0, 3), at(1, 3), at(2, 3));
-        ensure!(
-            bottom.length() <= 1e-6 * (1.0 + right.length()),
-            "`transform_matrix` must end in the row 0 0 0 1, found {bottom}; it may be transposed"
-        );
-        at(3, 3)
-    } else {
-        1.0
-    };
-    let column = |index: usize| DVec3::new(at(0, index), at(1, index), at(2, index));
-    let linear = DMat3::from_cols(column(0), column(1), column(2));
-    let translation = column(3) / weight;
-    ensure!(
-        translation.is_finite(),
-        "`transform_matrix` has no finite position: its last number is {weight}"
-    );
-    Ok(DAffine3 { matrix3: rotation(linear, owner, notes)?, translation })
+/// Positions beyond this many world units are a mistake, and nothing that f32 can still tell apart.
+const FARTHEST: f64 = 1e12;
+
+/// What the columns of a file's rotations are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Axes {
+    /// Right, up, back: the original NeRF's, nearly everybody's.
+    OpenGl,
+    /// Right, down, forward.
+    OpenCv,
+    /// Left, down, back: what instant-ngp makes of `from_mitsuba`.
+    Mitsuba,
 }
 
-/// The rotation nearest to `linear` once its scale is taken out.
-fn rotation(linear: DMat3, owner: &str, notes: &mut Notes) -> Result<DMat3> {
-    let lengths = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
+impl Axes {
+    /// The axes that the flags of a file ask for.
+    pub(super) fn of(file: Fields) -> Result<Self> {
+        // NeuS2's dialect.
+        if file.flag("from_na")? == Some(true) {
+            return Ok(Self::OpenCv);
+        }
+        let from_mitsuba = file.flag("from_mitsuba")?.unwrap_or(file.has(&["normal_mts_args"]));
+        Ok(if from_mitsuba { Self::Mitsuba } else { Self::OpenGl })
+    }
+
+    /// To right, up, back.
+    fn signs(self) -> DVec3 {
+        match self {
+            Self::OpenGl => DVec3::ONE,
+            Self::OpenCv => DVec3::new(1.0, -1.0, -1.0),
+            Self::Mitsuba => DVec3::new(-1.0, -1.0, 1.0),
+        }
+    }
+}
+
+/// Reads the pose of a frame, or `None` where it is not finite; `owner` names the frame in notes. The
+/// matrix may still be mirrored, which is for [`handedness`] to judge.
+pub(super) fn read(fields: Fields, axes: Axes, owner: &str, notes: &mut Notes) -> Result<Option<DAffine3>> {
+    let Some((key, matrix, axes)) = stated(fields, axes, owner, notes)? else {
+        return Ok(None);
+    };
+    let Some(matrix) = upright(key, &matrix, owner, notes)? else {
+        return Ok(None);
+    };
+    let matrix = matrix * matrix.w_axis.w.recip();
+    let translation = matrix.w_axis.truncate();
+    ensure!(
+        translation.is_finite() && translation.abs().max_element() < FARTHEST,
+        "`{key}` puts the camera at {translation}; expected a position within {FARTHEST:e} world units"
+    );
+    let linear = DMat3::from_mat4(matrix) * DMat3::from_diagonal(axes.signs());
+    Ok(Some(DAffine3 { matrix3: orthonormal(key, linear, owner, notes)?, translation }))
+}
+
+/// The numbers of the pose, the key they stand under and what the columns are; `None` where the matrix
+/// is null, as JavaScript writes what is not a number.
+fn stated(
+    fields: Fields,
+    axes: Axes,
+    owner: &str,
+    notes: &mut Notes,
+) -> Result<Option<(&'static str, Matrix, Axes)>> {
+    const KEYS: [(&str, Option<Axes>); 4] = [
+        ("transform_matrix", None),
+        // nerfstudio's exporter of cameras.
+        ("transform", Some(Axes::OpenGl)),
+        ("camera_to_world", None),
+        // SDFStudio.
+        ("camtoworld", Some(Axes::OpenCv)),
+    ];
+    let (start, end) = ("transform_matrix_start", "transform_matrix_end");
+    if let Some(mut matrix) = fields.matrix(start)? {
+        if let Some(last) = fields.matrix(end)?.filter(|last| last.numbers.len() == matrix.numbers.len()) {
+            for (a, b) in matrix.numbers.iter_mut().zip(last.numbers) {
+                *a = 0.5 * (*a + b);
+            }
+            let message = "the camera moves during the exposure; the pose halfway between \
+                           `transform_matrix_start` and `transform_matrix_end` is used";
+            notes.frame(Severity::Warning, owner, message);
+        }
+        return Ok(Some((start, matrix, axes)));
+    }
+    for (key, own_axes) in KEYS {
+        if let Some(matrix) = fields.matrix(key)? {
+            return Ok(Some((key, matrix, own_axes.unwrap_or(axes))));
+        }
+    }
+    if KEYS.iter().any(|(key, _)| fields.0.contains_key(*key)) {
+        return Ok(None);
+    }
+    bail!("`transform_matrix` is missing; every frame needs a camera-to-world matrix")
+}
+
+/// The 4x4 matrix with the translation in its last column and the last row 0 0 0 w.
+fn upright(key: &str, stated: &Matrix, owner: &str, notes: &mut Notes) -> Result<Option<DMat4>> {
+    let numbers = &stated.numbers;
+    let mut rows = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let is_four_by_three = stated.rows == Some([4, 3]);
+    match numbers.len() {
+        12 if is_four_by_three => {
+            for (row, values) in numbers.chunks_exact(3).enumerate() {
+                rows[4 * row..4 * row + 3].copy_from_slice(values);
+            }
+        }
+        12 | 16 => rows[..numbers.len()].copy_from_slice(numbers),
+        other => bail!("`{key}` must have 4x4 or 3x4 numbers, found {other}"),
+    }
+    if rows.iter().any(|number| !number.is_finite()) {
+        return Ok(None);
+    }
+    // Rows become columns here.
+    let transposed = DMat4::from_cols_array(&rows);
+    let matrix = transposed.transpose();
+    let strays = |matrix: DMat4| {
+        let bottom = matrix.row(3).truncate().abs().max_element();
+        bottom / (1.0 + matrix.w_axis.truncate().abs().max_element())
+    };
+    if strays(matrix) <= 1e-6 && !is_four_by_three {
+        return Ok(Some(matrix));
+    }
+    ensure!(
+        strays(transposed) <= 1e-6 && transposed.w_axis.w != 0.0,
+        "`{key}` must end in the row 0 0 0 1, found {}; write it camera-to-world, row by row",
+        matrix.row(3)
+    );
+    let message = "the matrix has its translation in the last row; it was transposed";
+    notes.frame(Severity::Note, owner, message);
+    Ok(Some(transposed))
+}
+
+/// The orthonormal matrix nearest to `linear` once its scale is taken out; it keeps the handedness.
+fn orthonormal(key: &str, linear: DMat3, owner: &str, notes: &mut Notes) -> Result<DMat3> {
+    let size = linear.to_cols_array().into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let unit = linear * size.recip();
+    let lengths = [unit.x_axis, unit.y_axis, unit.z_axis].map(DVec3::length);
     let volume: f64 = lengths.iter().product();
-    let determinant = linear.determinant();
+    let determinant = unit.determinant();
     ensure!(
-        volume > 0.0 && volume.is_finite() && determinant.abs() > 1e-6 * volume,
-        "`transform_matrix` is singular (determinant {determinant:e}); a camera needs three independent axes"
+        determinant.is_finite() && determinant.abs() > 1e-6 * volume,
+        "`{key}` is singular, with the columns {} {} {}; a camera needs three independent axes",
+        linear.x_axis,
+        linear.y_axis,
+        linear.z_axis
     );
-    ensure!(
-        determinant > 0.0,
-        "`transform_matrix` is mirrored (determinant {determinant:.3}): its axes are left-handed; \
-         negate one axis where it was exported, x right, y up, z backwards"
-    );
-    let scale = determinant.cbrt();
-    if (scale - 1.0).abs() > 1e-3 {
-        let message = "the rotation in `transform_matrix` is scaled; the scale was taken out";
-        notes.frame(Severity::Note, owner, message);
+    let scale = determinant.abs().cbrt();
+    if (scale * size - 1.0).abs() > 1e-3 {
+        notes.frame(
+            Severity::Note,
+            owner,
+            format!("the rotation in `{key}` is scaled; the scale was taken out"),
+        );
     }
-    // Newton's iteration for the polar decomposition.
-    let mut rotation = linear * scale.recip();
-    for _ in 0..30 {
-        rotation = (rotation + rotation.inverse().transpose()) * 0.5;
-    }
-    let change = (linear * scale.recip() - rotation).to_cols_array();
+    let start = unit * scale.recip();
+    let rotation = polar_factor(start).context("the rotation could not be found")?;
+    let change = (start - rotation).to_cols_array();
     let change = change.into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     ensure!(
         change < 0.1,
-        "`transform_matrix` is not a rotation: its axes have the lengths {lengths:.3?} or are not perpendicular"
+        "`{key}` is not a rotation: its columns have the lengths {:.3?} or are not perpendicular; \
+         export rigid poses",
+        lengths.map(|length| length * size)
     );
     if change > 1e-3 {
         let message =
-            "the axes in `transform_matrix` are not quite perpendicular; the nearest rotation is used";
+            format!("the axes in `{key}` are not quite perpendicular; the nearest rotation is used");
         notes.frame(Severity::Warning, owner, message);
     }
     Ok(rotation)
+}
+
+/// The orthonormal factor of the polar decomposition, by Newton's iteration (Higham 1986).
+fn polar_factor(start: DMat3) -> Option<DMat3> {
+    let mut factor = start;
+    for _ in 0..60 {
+        let next = (factor + factor.inverse().transpose()) * 0.5;
+        let is_settled = next.abs_diff_eq(factor, 1e-15);
+        factor = next;
+        if is_settled {
+            break;
+        }
+    }
+    factor.is_finite().then_some(factor)
 }

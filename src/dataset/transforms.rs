@@ -1,14 +1,21 @@
 //! The `transforms.json` family: what one file lists, before any image is looked for.
 
+mod dialect;
+mod outline;
+mod scene_box;
+mod split_lists;
+
 use anyhow::{Context, Result, bail, ensure};
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use serde_json::Value;
 
 use super::Split;
-use super::intrinsics::{self, Intrinsics};
-use super::json::{self, Fields, describe};
-use super::notes::{Notes, Severity};
-use super::pose;
+use super::intrinsics::{self, Intrinsics, Stated};
+use super::json::{self, Fields, describe, shortened};
+use super::notes::{Note, Notes, Severity};
+use super::pose::{self, Axes, handedness};
+use outline::Section;
+pub use scene_box::SceneBox;
 
 /// One parsed file.
 #[derive(Debug)]
@@ -31,169 +38,148 @@ pub struct Entry {
     pub file_path: String,
     /// Focal length, principal point and lens.
     pub intrinsics: Intrinsics,
-    /// Camera-to-world pose.
+    /// Camera-to-world pose: an orthonormal matrix, improper where the world is left-handed, and a position.
     pub world_from_camera: DAffine3,
     /// The split that the file's own lists put the frame in.
     pub split: Option<Split>,
 }
 
-/// A scene box in instant-ngp's terms: `world * scale + offset` maps the inner cube to `[0, 1]³`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SceneBox {
-    /// Unit-cube lengths per world unit.
-    pub scale: f64,
-    /// Where the world's origin lies in the unit cube.
-    pub offset: DVec3,
-    /// Side of the whole box in inner cubes: a power of two, 1 to 128.
-    pub aabb_scale: u32,
+impl Listing {
+    /// What is to be said about how the file was read.
+    pub fn notes(&self) -> Vec<Note> {
+        self.notes.clone().finish()
+    }
+}
+
+/// Parses the bytes of one file. Errors name the frame and the key.
+pub fn parse_bytes(bytes: &[u8]) -> Result<Listing> {
+    parse(&json::decode(bytes)?)
 }
 
 /// Parses the text of one file. Errors name the frame and the key.
 pub fn parse(text: &str) -> Result<Listing> {
     let document = json::parse(text)?;
-    let file = Fields(&document);
-    let frames = file.list("frames")?.with_context(|| {
-        let keys: Vec<_> = document.keys().take(8).map(String::as_str).collect();
-        format!("expected a transforms.json with a list `frames`, found the keys {}", keys.join(", "))
-    })?;
-    ensure!(!frames.is_empty(), "`frames` is empty; expected at least one frame");
+    let sections = outline::sections(&document)?;
     let mut notes = Notes::default();
-    let scene_box = scene_box(file, &mut notes)?;
-    let lists = SplitLists::read(file)?;
-    let mut entries = Vec::with_capacity(frames.len());
-    for (index, frame) in frames.iter().enumerate() {
-        let label = label(index, frame);
-        let entry = entry(frame, file, &lists, &label, &mut notes);
-        entries.push(entry.with_context(|| label.clone())?);
+    let mut entries = Vec::new();
+    let mut unposed = Vec::new();
+    for section in &sections {
+        let file = File::read(section, &mut notes)?;
+        for (index, &(key, frame)) in section.frames.iter().enumerate() {
+            let label = label(index, key, frame);
+            let read = file.entry(key, frame, &label, &mut notes).with_context(|| label.clone())?;
+            match read {
+                Some(entry) => entries.push(entry),
+                None => unposed.push(label),
+            }
+        }
     }
-    if lists.any() && entries.iter().all(|entry| entry.split.is_none()) {
-        bail!("none of the frames is named in `train_filenames`, `val_filenames`, `test_filenames`");
+    report_unposed(&unposed, entries.len(), &mut notes)?;
+    handedness::settle(&mut entries, &mut notes)?;
+    let around = sections.first().map_or(&[][..], |section| &section.around);
+    let mut scene_box = None;
+    for &file in around {
+        split_lists::assign(file, &mut entries, &mut notes)?;
+        scene_box = scene_box.or(SceneBox::read(file, &mut notes)?);
     }
-    Ok(Listing { frames: entries, scene_box, dialect: dialect(file), notes })
+    let first = sections.iter().find_map(|section| section.frames.first()?.1.as_object());
+    let dialect = dialect::name(around.first().copied(), first.map(Fields));
+    Ok(Listing { frames: entries, scene_box, dialect, notes })
 }
 
-fn label(index: usize, frame: &Value) -> String {
-    match frame.get("file_path").and_then(Value::as_str) {
-        Some(path) => format!("frame {index} '{path}'"),
+/// Keys under which tools write the name of the image.
+const NAME_KEYS: [&str; 9] =
+    ["file_path", "image_path", "file_name", "filename", "rgb_path", "img_path", "image", "path", "name"];
+
+fn label(index: usize, key: Option<&str>, frame: &Value) -> String {
+    let name = NAME_KEYS.iter().find_map(|key| frame.get(key)?.as_str()).or(key);
+    match name {
+        Some(path) => format!("frame {index} '{}'", shortened(path)),
         None => format!("frame {index}"),
     }
 }
 
-fn entry(frame: &Value, file: Fields, lists: &SplitLists, label: &str, notes: &mut Notes) -> Result<Entry> {
-    let Value::Object(map) = frame else {
-        bail!("expected an object, found {}", describe(frame));
-    };
-    let fields = Fields(map);
-    let file_path = fields
-        .text("file_path")?
-        .context("`file_path` is missing; every frame needs the name of its image")?
-        .replace('\\', "/");
-    ensure!(!file_path.trim().is_empty(), "`file_path` is empty");
-    let mut layers = vec![fields];
-    if let Some(Value::Object(nested)) = fields.get("intrinsics") {
-        layers.push(Fields(nested));
-    }
-    layers.push(file);
-    if fields.has(&["mask_path"]) {
-        let message = "masks (`mask_path`) are not used; the masked pixels are trained on";
-        notes.frame(Severity::Warning, label, message);
-    }
-    Ok(Entry {
-        label: label.to_owned(),
-        intrinsics: intrinsics::read(&layers, label, notes)?,
-        world_from_camera: pose::read(fields, label, notes)?,
-        split: lists.split_of(&file_path),
-        file_path,
-    })
+/// What the objects around the frames say for all of them.
+struct File {
+    split: Option<Split>,
+    axes: Axes,
+    intrinsics: Vec<Stated>,
 }
 
-/// Lists of file names per split, in the file itself.
-struct SplitLists([Vec<String>; 3]);
-
-impl SplitLists {
-    const KEYS: [(Split, &'static str); 3] =
-        [(Split::Train, "train_filenames"), (Split::Val, "val_filenames"), (Split::Test, "test_filenames")];
-
-    fn read(file: Fields) -> Result<Self> {
-        let mut lists = Self(Default::default());
-        for (list, (_, key)) in lists.0.iter_mut().zip(Self::KEYS) {
-            for name in file.list(key)?.unwrap_or_default() {
-                let Value::String(name) = name else {
-                    bail!("`{key}` must list file names, found {}", describe(name));
-                };
-                list.push(normal(name).to_owned());
-            }
+impl File {
+    fn read(section: &Section, notes: &mut Notes) -> Result<Self> {
+        let mut file = Self { split: section.split, axes: Axes::OpenGl, intrinsics: Vec::new() };
+        for &fields in &section.around {
+            let axes = Axes::of(fields)?;
+            file.axes = if file.axes == Axes::OpenGl { axes } else { file.axes };
+            file.intrinsics.extend(stated(fields, "the file", notes)?);
         }
-        Ok(lists)
+        Ok(file)
     }
 
-    fn any(&self) -> bool {
-        self.0.iter().any(|list| !list.is_empty())
-    }
-
-    fn split_of(&self, file_path: &str) -> Option<Split> {
-        let lists = self.0.iter().zip(Self::KEYS);
-        let mut holding = lists.filter(|(list, _)| list.iter().any(|n| n == normal(file_path)));
-        holding.next_back().map(|(_, (split, _))| split)
-    }
-}
-
-fn normal(file_path: &str) -> &str {
-    file_path.strip_prefix("./").unwrap_or(file_path)
-}
-
-fn scene_box(file: Fields, notes: &mut Notes) -> Result<Option<SceneBox>> {
-    if !file.has(&["aabb_scale", "scale", "offset", "aabb"]) {
-        return Ok(None);
-    }
-    let asked = file.positive("aabb_scale", f64::INFINITY)?.unwrap_or(1.0);
-    let aabb_scale = (asked.ceil().clamp(1.0, 128.0) as u32).next_power_of_two();
-    if f64::from(aabb_scale) != asked {
-        notes.note(format!("`aabb_scale` is {asked}; {aabb_scale} is used, a power of two from 1 to 128"));
-    }
-    // An explicit box is meant in world units and replaces scale and offset.
-    if let Some(corners) = file.numbers("aabb")? {
-        let [x0, y0, z0, x1, y1, z1] = corners[..] else {
-            bail!("`aabb` must be [[x, y, z], [x, y, z]], found {} numbers", corners.len());
+    /// Reads a frame, or `None` where its pose is not finite.
+    fn entry(
+        &self,
+        key: Option<&str>,
+        frame: &Value,
+        label: &str,
+        notes: &mut Notes,
+    ) -> Result<Option<Entry>> {
+        let Value::Object(map) = frame else {
+            bail!("expected an object, found {}", describe(frame));
         };
-        let (a, b) = (DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1));
-        let side = (b - a).abs().max_element();
-        ensure!(side > 0.0, "`aabb` has no extent: both corners are {a}");
-        return Ok(Some(SceneBox {
-            scale: side.recip(),
-            offset: DVec3::splat(0.5) - 0.5 * (a + b) / side,
-            aabb_scale,
-        }));
+        let fields = Fields(map);
+        let file_path = file_path(fields, key)?;
+        if fields.has(&["mask_path"]) {
+            let message = "masks (`mask_path`) are not used; the masked pixels are trained on";
+            notes.frame(Severity::Warning, label, message);
+        }
+        let own = stated(fields, label, notes)?;
+        let layers: Vec<&Stated> = own.iter().chain(&self.intrinsics).collect();
+        let intrinsics = Intrinsics::resolve(&layers, label, notes)?;
+        let Some(world_from_camera) = pose::read(fields, self.axes, label, notes)? else {
+            return Ok(None);
+        };
+        let label = label.to_owned();
+        Ok(Some(Entry { label, intrinsics, world_from_camera, split: self.split, file_path }))
     }
-    let offset = match file.get("offset") {
-        Some(Value::Array(_)) => match file.numbers("offset")?.as_deref() {
-            Some(&[x, y, z]) => DVec3::new(x, y, z),
-            _ => bail!("`offset` must be one number or three"),
-        },
-        _ => DVec3::splat(file.number("offset")?.unwrap_or(0.5)),
-    };
-    Ok(Some(SceneBox { scale: file.positive("scale", f64::INFINITY)?.unwrap_or(0.33), offset, aabb_scale }))
 }
 
-fn dialect(file: Fields) -> &'static str {
-    const NERFSTUDIO: [&str; 6] = [
-        "camera_model",
-        "applied_transform",
-        "ply_file_path",
-        "orientation_override",
-        "train_filenames",
-        "test_filenames",
-    ];
-    const NGP: [&str; 5] = ["aabb_scale", "aabb", "offset", "fl_x", "k1"];
-    if file.has(&NERFSTUDIO) {
-        "nerfstudio"
-    } else if file.has(&NGP) {
-        "instant-ngp"
-    } else if file.has(&["camera_angle_x", "camera_angle_y"]) {
-        "blender"
-    } else {
-        "per-frame intrinsics"
+/// What an object and those nested in it state about the camera, in falling priority.
+fn stated(fields: Fields, owner: &str, notes: &mut Notes) -> Result<Vec<Stated>> {
+    let nested = fields.objects(&intrinsics::OBJECTS);
+    std::iter::once(fields).chain(nested).map(|fields| Stated::read(fields, owner, notes)).collect()
+}
+
+/// The name of the image, with forward slashes.
+fn file_path(fields: Fields, key: Option<&str>) -> Result<String> {
+    for name_key in NAME_KEYS {
+        if let Some(path) = fields.text(name_key)? {
+            let path = path.trim().strip_prefix("file://").unwrap_or(path.trim()).replace('\\', "/");
+            ensure!(!path.is_empty(), "`{name_key}` is empty; every frame needs the name of its image");
+            return Ok(path);
+        }
     }
+    key.map(|key| key.replace('\\', "/"))
+        .context("`file_path` is missing; every frame needs the name of its image")
+}
+
+/// Exporters write NaN where an image was not registered.
+fn report_unposed(unposed: &[String], posed: usize, notes: &mut Notes) -> Result<()> {
+    let Some(first) = unposed.first() else {
+        return Ok(());
+    };
+    ensure!(
+        posed > 0,
+        "{first}: `transform_matrix` is not finite, and so in every frame; register the images again"
+    );
+    let more = if unposed.len() > 1 { format!(" and {} more", unposed.len() - 1) } else { String::new() };
+    notes.warn(format!(
+        "{} of {} frames have no finite `transform_matrix` and are left out: {first}{more}",
+        unposed.len(),
+        posed + unposed.len()
+    ));
+    Ok(())
 }
 
 #[cfg(test)]

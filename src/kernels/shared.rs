@@ -113,8 +113,9 @@ impl Camera {
         let side = 2.0 * bounds.outer_half();
         let axis = |axis: glam::DVec3| axis.normalize_or_zero().as_vec3().to_array();
         let (radial, tangential) = match camera.lens {
-            Lens::Pinhole => ([0.0; 4], [0.0; 2]),
             Lens::OpenCv { k, p } => (k, p),
+            Lens::Fisheye { k } => (k, [0.0; 2]),
+            Lens::Pinhole | Lens::Orthographic | Lens::Equirectangular => ([0.0; 4], [0.0; 2]),
         };
         Self {
             origin: ((pose.translation - bounds.min()) / side).as_vec3().to_array(),

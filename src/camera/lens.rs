@@ -1,0 +1,131 @@
+//! Lens models: which direction of the camera a point of the image shows, and back.
+//!
+//! Points of the image are given on the normalised image plane, `(pixel - center_px) / focal_px`, +x right
+//! and +y down. Points and directions of the camera are in its axes: +X right, +Y up, the view along -Z.
+
+use super::{equirectangular, fisheye, open_cv};
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// How a camera maps directions to its image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lens {
+    /// No distortion.
+    #[default]
+    Pinhole,
+    /// OpenCV's radial-tangential model:
+    /// `x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸) + 2 p1 x y + p2 (r² + 2 x²)` and
+    /// `y_d = y (1 + …) + p1 (r² + 2 y²) + 2 p2 x y`, with y pointing down.
+    OpenCv {
+        /// Radial coefficients k1..k4.
+        k: [f64; 4],
+        /// Tangential coefficients p1, p2.
+        p: [f64; 2],
+    },
+    /// OpenCV's fisheye: a ray at the angle θ from the view axis is imaged at the distance
+    /// `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` from the principal point.
+    Fisheye {
+        /// Coefficients k1..k4.
+        k: [f64; 4],
+    },
+    /// Parallel rays, which start on the image plane; `focal_px` is pixels per world unit.
+    Orthographic,
+    /// Longitude to the right and latitude upwards, the view axis in the middle; `focal_px` is pixels per radian.
+    Equirectangular,
+}
+
+/// The model of a lens, without its coefficients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LensKind {
+    /// [`Lens::Pinhole`].
+    Pinhole,
+    /// [`Lens::OpenCv`].
+    OpenCv,
+    /// [`Lens::Fisheye`].
+    Fisheye,
+    /// [`Lens::Orthographic`].
+    Orthographic,
+    /// [`Lens::Equirectangular`].
+    Equirectangular,
+}
+
+/// A ray in the camera's axes; lengths are in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LensRay {
+    /// Where it starts, seen from the camera's position.
+    pub(super) offset: DVec3,
+    /// Its direction, of any length but 0.
+    pub(super) direction: DVec3,
+}
+
+impl LensKind {
+    /// All models.
+    pub const ALL: [Self; 5] =
+        [Self::Pinhole, Self::OpenCv, Self::Fisheye, Self::Orthographic, Self::Equirectangular];
+
+    /// What the model is called.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pinhole => "pinhole",
+            Self::OpenCv => "OpenCV",
+            Self::Fisheye => "fisheye",
+            Self::Orthographic => "orthographic",
+            Self::Equirectangular => "equirectangular",
+        }
+    }
+}
+
+impl Lens {
+    /// Which model it is.
+    #[must_use]
+    pub const fn kind(&self) -> LensKind {
+        match self {
+            Self::Pinhole => LensKind::Pinhole,
+            Self::OpenCv { .. } => LensKind::OpenCv,
+            Self::Fisheye { .. } => LensKind::Fisheye,
+            Self::Orthographic => LensKind::Orthographic,
+            Self::Equirectangular => LensKind::Equirectangular,
+        }
+    }
+
+    /// What depth means behind this lens, wherever a depth is given: the distance along the ray for a lens
+    /// that sees sideways and behind (fisheye, equirectangular), the distance along the view axis otherwise.
+    #[must_use]
+    pub const fn depth_is_distance(&self) -> bool {
+        matches!(self, Self::Fisheye { .. } | Self::Equirectangular)
+    }
+
+    /// The ray that is imaged at `plane`, or `None` where the lens images none.
+    pub(super) fn ray(&self, plane: DVec2) -> Option<LensRay> {
+        let flat = |at: DVec2| DVec3::new(at.x, -at.y, -1.0);
+        let (offset, direction) = match self {
+            Self::Pinhole => (DVec3::ZERO, flat(plane)),
+            Self::OpenCv { k, p } => (DVec3::ZERO, flat(open_cv::undistort(k, p, plane)?)),
+            Self::Fisheye { k } => (DVec3::ZERO, fisheye::direction(k, plane)?),
+            Self::Orthographic => (DVec3::new(plane.x, -plane.y, 0.0), DVec3::NEG_Z),
+            Self::Equirectangular => (DVec3::ZERO, equirectangular::direction(plane)?),
+        };
+        Some(LensRay { offset, direction })
+    }
+
+    /// Where a point of the camera's axes is imaged, and its depth in world units as
+    /// [`Lens::depth_is_distance`] defines it; `None` where the lens does not see it.
+    pub(super) fn image(&self, point: DVec3) -> Option<(DVec2, f64)> {
+        let depth = if self.depth_is_distance() { point.length() } else { -point.z };
+        if depth.is_nan() || depth <= 0.0 {
+            return None;
+        }
+        let across = DVec2::new(point.x, -point.y);
+        let plane = match self {
+            Self::Pinhole => across / depth,
+            Self::OpenCv { k, p } => open_cv::image(k, p, across / depth)?,
+            Self::Fisheye { k } => fisheye::image(k, point)?,
+            Self::Orthographic => across,
+            Self::Equirectangular => equirectangular::image(point),
+        };
+        Some((plane, depth))
+    }
+}

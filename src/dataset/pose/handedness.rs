@@ -1,0 +1,200 @@
+//! Files whose rotations are mirrored: determinant -1 where a rotation has +1.
+
+use anyhow::{Result, ensure};
+use glam::{DAffine3, DMat3, DVec3};
+
+use crate::dataset::notes::Notes;
+use crate::dataset::transforms::Entry;
+
+/// Makes one reading of all poses of a file. Where nearly all are mirrored, that is how the file means it,
+/// and there are two ways to mean it: right, up, back in a left-handed world, which is kept; or right, up,
+/// forward in a right-handed one, as game engines have it, whose third axis is turned round. The second is
+/// taken where the third axes meet in front of the cameras. Where few are mirrored, they are left out.
+pub(in crate::dataset) fn settle(entries: &mut Vec<Entry>, notes: &mut Notes) -> Result<()> {
+    let count = entries.len();
+    let mirrored = entries.iter().filter(|entry| is_mirrored(entry)).count();
+    if mirrored == 0 {
+        remark_on_axes(entries, notes);
+        return Ok(());
+    }
+    let majority = 10 * mirrored >= 9 * count;
+    ensure!(
+        majority || 10 * mirrored <= count,
+        "{mirrored} of {count} matrices are mirrored (determinant -1), beginning with {}; expected all or \
+         none, with the columns right, up, back; export the cameras by one rule",
+        entries.iter().find(|entry| is_mirrored(entry)).map_or("", |entry| &entry.label)
+    );
+    leave_out(entries, !majority, notes);
+    if !majority {
+        return Ok(());
+    }
+    let agreement = Convergence::of(entries);
+    if agreement.is_some_and(|axes| axes.in_front >= 0.8 && axes.miss < axes.distance) {
+        for entry in entries {
+            entry.world_from_camera.matrix3.z_axis *= -1.0;
+        }
+        notes.warn(
+            "the matrices are mirrored (determinant -1) and their third columns meet in front of the cameras: \
+             they are read as right, up, forward, and the third column is turned round",
+        );
+    } else {
+        notes.warn(
+            "the matrices are mirrored (determinant -1): they are read as right, up, back in a left-handed \
+             world, which is kept",
+        );
+    }
+    Ok(())
+}
+
+fn is_mirrored(entry: &Entry) -> bool {
+    entry.world_from_camera.matrix3.determinant() < 0.0
+}
+
+/// Drops the few frames that differ from the others.
+fn leave_out(entries: &mut Vec<Entry>, mirrored: bool, notes: &mut Notes) {
+    let odd: Vec<&str> =
+        entries.iter().filter(|e| is_mirrored(e) == mirrored).map(|e| e.label.as_str()).collect();
+    if odd.is_empty() {
+        return;
+    }
+    let named = odd[..odd.len().min(3)].join(", ");
+    let more = if odd.len() > 3 { ", …" } else { "" };
+    let handed = if mirrored { "mirrored" } else { "not mirrored" };
+    notes.warn(format!(
+        "{} frames are {handed}, unlike the others, and left out: {named}{more}; export them again",
+        odd.len()
+    ));
+    entries.retain(|entry| is_mirrored(entry) != mirrored);
+}
+
+/// Cameras that look away from one point may look the wrong way.
+fn remark_on_axes(entries: &[Entry], notes: &mut Notes) {
+    let Some(axes) = Convergence::of(entries) else {
+        return;
+    };
+    if entries.len() >= 8 && axes.in_front >= 0.95 && axes.miss < 0.3 * axes.distance {
+        notes.note(
+            "the cameras look away from the point that their axes meet in; if they should look at it, the \
+             matrices are in OpenCV's axes, and their second and third columns need the opposite sign",
+        );
+    }
+}
+
+/// How the third columns of the poses meet.
+#[derive(Clone, Copy)]
+struct Convergence {
+    /// Share of the cameras that have the meeting point on the positive side of the axis.
+    in_front: f64,
+    /// Mean distance of the axes from it, world units.
+    miss: f64,
+    /// Mean distance along the axes, world units.
+    distance: f64,
+}
+
+impl Convergence {
+    /// `None` for fewer than three cameras, and where the axes are too parallel to meet.
+    fn of(entries: &[Entry]) -> Option<Self> {
+        let poses = || entries.iter().map(|entry| entry.world_from_camera);
+        let count = entries.len() as f64;
+        let across = |pose: DAffine3| {
+            let axis = pose.matrix3.z_axis;
+            DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z)
+        };
+        // The point nearest to all axes: the sum of the projections across them is inverted.
+        let sum = poses().fold(DMat3::ZERO, |sum, pose| sum + across(pose));
+        if entries.len() < 3 || sum.determinant() < 1e-3 * count.powi(3) {
+            return None;
+        }
+        let target = poses().fold(DVec3::ZERO, |sum, pose| sum + across(pose) * pose.translation);
+        let point = sum.inverse() * target;
+        let along = |pose: DAffine3| (point - pose.translation).dot(pose.matrix3.z_axis);
+        let miss = poses().map(|pose| (across(pose) * (point - pose.translation)).length());
+        Some(Self {
+            in_front: poses().filter(|&pose| along(pose) > 0.0).count() as f64 / count,
+            miss: miss.sum::<f64>() / count,
+            distance: poses().map(|pose| along(pose).abs()).sum::<f64>() / count,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::transforms::{Listing, parse};
+
+    /// Cameras on a circle whose third column points along `outward` times the way out.
+    fn ring(count: u32, outward: f64, mirrored: impl Fn(u32) -> bool) -> Result<Listing> {
+        let frame = |index: u32| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(index) / f64::from(count)).sin_cos();
+            let (bx, by) = (outward * cos, outward * sin);
+            let side = if mirrored(index) { 1.0 } else { -1.0 };
+            // right = side * (by, -bx, 0), up = z, back = (bx, by, 0).
+            format!(
+                "{{\"file_path\": \"{index}\", \"transform_matrix\": [{}, 0, {bx}, {}, {}, 0, {by}, {}, \
+                 0, 1, 0, {}]}}",
+                side * by,
+                4.0 * cos,
+                -side * bx,
+                4.0 * sin,
+                0.1 * f64::from(index % 3)
+            )
+        };
+        let frames: Vec<_> = (0..count).map(frame).collect();
+        parse(&format!("{{\"fl_x\": 9, \"frames\": [{}]}}", frames.join(",")))
+    }
+
+    fn messages(listing: Listing) -> String {
+        listing.notes.finish().iter().map(|note| format!("{note}\n")).collect()
+    }
+
+    #[test]
+    fn proper_rings_are_left_alone() {
+        let listing = ring(12, 1.0, |_| false).expect("valid");
+        assert!(listing.frames.iter().all(|entry| !is_mirrored(entry)));
+        assert_eq!(messages(listing), "");
+        assert!(messages(ring(12, -1.0, |_| false).expect("valid")).contains("look away"));
+    }
+
+    #[test]
+    fn a_left_handed_world_is_kept() {
+        let listing = ring(12, 1.0, |_| true).expect("valid");
+        assert!(listing.frames.iter().all(is_mirrored));
+        assert!(
+            listing.frames.iter().all(|e| e
+                .world_from_camera
+                .matrix3
+                .z_axis
+                .dot(e.world_from_camera.translation)
+                > 3.0)
+        );
+        assert!(messages(listing).contains("left-handed world"));
+    }
+
+    #[test]
+    fn a_forward_axis_is_turned_round() {
+        let listing = ring(12, -1.0, |_| true).expect("valid");
+        assert!(listing.frames.iter().all(|entry| !is_mirrored(entry)));
+        assert!(
+            listing.frames.iter().all(|e| e
+                .world_from_camera
+                .matrix3
+                .z_axis
+                .dot(e.world_from_camera.translation)
+                > 3.0)
+        );
+        assert!(messages(listing).contains("right, up, forward"));
+    }
+
+    #[test]
+    fn a_few_odd_frames_are_left_out_and_many_refused() {
+        let listing = ring(20, 1.0, |index| index == 7).expect("valid");
+        assert_eq!(listing.frames.len(), 19);
+        assert!(
+            messages(listing).contains("1 frames are mirrored, unlike the others, and left out: frame 7")
+        );
+        let listing = ring(20, 1.0, |index| index != 7).expect("valid");
+        assert_eq!(listing.frames.len(), 19);
+        let message = ring(20, 1.0, |index| index < 5).expect_err("refused").to_string();
+        assert!(message.contains("5 of 20 matrices are mirrored"), "{message}");
+    }
+}

@@ -1,0 +1,89 @@
+//! Which family of tools wrote a file, from the keys that only they write.
+
+use crate::dataset::json::{Fields, Matrix};
+
+/// What a user calls the origin of a file; `frame` is its first frame, if that is an object.
+pub(super) fn name(file: Option<Fields>, frame: Option<Fields>) -> &'static str {
+    let has = |fields: Option<Fields>, keys: &[&str]| fields.is_some_and(|fields| fields.has(keys));
+    let in_file = |keys: &[&str]| has(file, keys);
+    let in_frame = |keys: &[&str]| has(frame, keys);
+    if in_frame(&["camtoworld"]) {
+        "SDFStudio"
+    } else if in_file(&["from_na"]) || in_frame(&["intrinsic_matrix"]) {
+        "NeuS2"
+    } else if in_file(&["test_frames"]) {
+        "nerfstudio (ScanNet++)"
+    } else if in_frame(&["transform"]) && !in_frame(&["transform_matrix"]) {
+        "nerfstudio (exported cameras)"
+    } else if in_file(&NERFSTUDIO) || in_frame(&["camera_model", "colmap_im_id"]) {
+        file.map_or("nerfstudio", |file| nerfstudio(file, frame))
+    } else if in_file(&["integer_depth_scale"]) && in_frame(&["depth_path"]) && in_frame(&["fl_x"]) {
+        "instant-ngp (NeRFCapture)"
+    } else if in_file(&NGP) || in_frame(&["is_fisheye", "sharpness"]) {
+        "instant-ngp"
+    } else if in_file(&["camera_angle_x", "camera_angle_y"]) {
+        "blender"
+    } else {
+        "per-frame intrinsics"
+    }
+}
+
+const NERFSTUDIO: [&str; 9] = [
+    "camera_model",
+    "applied_transform",
+    "applied_scale",
+    "ply_file_path",
+    "orientation_override",
+    "train_filenames",
+    "val_filenames",
+    "test_filenames",
+    "auto_scale_poses_override",
+];
+
+const NGP: [&str; 13] = [
+    "aabb_scale",
+    "aabb",
+    "offset",
+    "fl_x",
+    "k1",
+    "x_fov",
+    "is_fisheye",
+    "n_frames",
+    "from_mitsuba",
+    "render_aabb",
+    "envmap",
+    "white_transparent",
+    "integer_depth_scale",
+];
+
+/// Which of the converters of `ns-process-data` wrote it, where that leaves a trace.
+fn nerfstudio(file: Fields, frame: Option<Fields>) -> &'static str {
+    let in_frame = |keys: &[&str]| frame.is_some_and(|frame| frame.has(keys));
+    let is_text =
+        |key: &str, expected: &str| file.get(key).and_then(|value| value.as_str()) == Some(expected);
+    let applied = file.matrix("applied_transform").ok().flatten();
+    if in_frame(&["colmap_im_id"]) || applied.as_ref().is_some_and(is_from_colmap) {
+        "nerfstudio (COLMAP)"
+    } else if applied.as_ref().is_some_and(is_from_metashape) {
+        "nerfstudio (Metashape)"
+    } else if is_text("ply_file_path", "reconstruction.ply") {
+        "nerfstudio (OpenDroneMap)"
+    } else if is_text("orientation_override", "none") && in_frame(&["fl_x"]) {
+        // Both are converted without turning the scene; only Polycam's photos are undistorted already.
+        if in_frame(&["k1", "p1"]) { "nerfstudio (RealityCapture)" } else { "nerfstudio (Polycam)" }
+    } else {
+        "nerfstudio"
+    }
+}
+
+/// COLMAP's axes are turned so that z points up, in two ways over the years.
+fn is_from_colmap(matrix: &Matrix) -> bool {
+    let now = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
+    let once = [0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0];
+    matrix.numbers == now || matrix.numbers == once
+}
+
+/// Metashape's axes are cycled.
+fn is_from_metashape(matrix: &Matrix) -> bool {
+    matrix.numbers == [0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]
+}
