@@ -2,6 +2,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod check;
+pub(crate) mod info;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::config::Background;
@@ -52,6 +53,8 @@ pub(crate) enum Command {
     Eval(Eval),
     /// Write the page about a training: curves, test views, settings
     Report(Report),
+    /// Look at a dataset before training on it: what was read, what was assumed, what is wrong
+    Info(info::Info),
     /// Write an analytic scene with exact ground truth as a dataset
     Generate(Generate),
     /// Measure error against run time

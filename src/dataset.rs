@@ -4,7 +4,7 @@
 //! dataset's own, in its own units.
 
 mod bounds;
-mod focus;
+pub(crate) mod focus;
 mod frames;
 mod intrinsics;
 mod json;

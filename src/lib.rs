@@ -68,6 +68,7 @@ pub mod config;
 pub mod dataset;
 pub mod file;
 pub mod gpu;
+pub mod health;
 pub mod image;
 pub mod kernels;
 pub mod metrics;

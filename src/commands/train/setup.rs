@@ -1,16 +1,16 @@
 //! What is trained, on what, and for how long: the command line, the dataset and an earlier training together.
 
-use crate::commands::find_frames;
+use crate::commands::{find_frames, needs};
 use crate::progress::{duration, short};
 use crate::remarks::Remarks;
 use anyhow::{Result, ensure};
-use nerf::camera::{Camera, Lens};
+use nerf::camera::Camera;
 use nerf::checkpoint::{About, Checkpoint, FORMAT, Splits};
 use nerf::config::{Background, Config};
 use nerf::dataset::Dataset;
 use nerf::gpu::Gpu;
+use nerf::kernels::Plan;
 use nerf::kernels::training::accumulation_name;
-use nerf::kernels::{Needs, Plan};
 use nerf::model::finest_resolution;
 use nerf::orbit::Orbit;
 use nerf::schedule::Budget;
@@ -117,20 +117,12 @@ impl Setup {
 
     /// The parts that the scene does not need.
     pub(in crate::commands) fn left_out(&self, dataset: &Dataset) -> Vec<&'static str> {
-        let needs = &self.plan.needs;
-        let parts = [
-            (!needs.lens, "lens model (all cameras are pinholes)"),
-            (needs.cascades == 1, "cascades and growing steps (the scene is bounded)"),
-            (!needs.alpha && !needs.hdr, "alpha (the images are opaque)"),
-            (!needs.hdr, "linear pixels (the images have 8 bits)"),
-            (self.about.config.background != Background::Random, "random backgrounds (not asked for)"),
-            (dataset.is_hdr, "8-bit pixels (the images are linear)"),
-        ];
-        parts.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, part)| part).collect()
+        needs::left_out(&self.plan.needs, self.about.config.background, dataset)
     }
 }
 
-fn cameras(dataset: &Dataset, indices: &[usize]) -> Vec<Camera> {
+/// The cameras of some frames.
+pub(in crate::commands) fn cameras(dataset: &Dataset, indices: &[usize]) -> Vec<Camera> {
     indices.iter().map(|&index| dataset.frames[index].camera.clone()).collect()
 }
 
@@ -149,15 +141,19 @@ fn configure(mut config: Config, wishes: &Wishes<'_>) -> Result<Config> {
     Ok(config)
 }
 
+/// The settings when nothing is said.
+pub(in crate::commands) fn defaults(is_cpu: bool, dataset: &Dataset) -> Result<Config> {
+    if is_cpu { Config::for_cpu(dataset.bounds.cascades > 1) } else { Ok(Config::default()) }
+}
+
 fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
     let bounds = dataset.bounds.clone();
-    let defaults = if gpu.is_cpu() { Config::for_cpu(bounds.cascades > 1)? } else { Config::default() };
+    let defaults = defaults(gpu.is_cpu(), dataset)?;
     let mut config = configure(defaults, wishes)?;
     let cameras = cameras(dataset, &dataset.train);
     if config.grid.finest == 0 {
         config.grid.finest = finest_resolution(config.grid.base, &bounds, &cameras);
     }
-    let mut used = dataset.train.iter().chain(&dataset.test);
     let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
     let orbit = Orbit::of(&cameras, bounds.center);
     Ok(About {
@@ -168,14 +164,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
         rays: config.batch.first_rays,
         seconds: 0.0,
         budget: Budget::default(),
-        needs: Needs {
-            lens: used.any(|&index| dataset.frames[index].camera.lens != Lens::Pinhole),
-            alpha: dataset.train.iter().any(|&index| dataset.frames[index].has_alpha),
-            hdr: dataset.is_hdr,
-            cascades: bounds.cascades,
-            cameras: cameras.len(),
-            ..Needs::default()
-        },
+        needs: needs::of(dataset),
         splits: Splits { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) },
         image_size: [orbit.width, orbit.height],
         has_alpha: dataset.is_cutout,

@@ -1,0 +1,249 @@
+//! The report as text.
+
+use super::memory::Memory;
+use super::{Report, problems};
+use glam::DVec3;
+use nerf::health::{Arrangement, Gaze, Severity, Spread};
+use nerf::words::{bytes, count, length, percent};
+
+/// Width of the headings at the left.
+const MARGIN: usize = 10;
+
+impl Report<'_> {
+    pub(super) fn text(&self) -> String {
+        let sections = [
+            ("dataset", self.about_dataset()),
+            ("frames", self.about_frames()),
+            ("images", self.about_images()),
+            ("cameras", self.about_cameras()),
+            ("box", self.about_box()),
+            ("coverage", self.about_coverage()),
+            ("gaze", about_gaze(&self.survey.gaze, self.survey.views.len())),
+            ("photos", self.about_photos()),
+            ("memory", self.memory.as_ref().map_or_else(Vec::new, about_memory)),
+            ("left out", vec![self.left_out.join(", ")]),
+        ];
+        let mut text = String::new();
+        for (heading, lines) in sections {
+            for (number, line) in lines.into_iter().enumerate() {
+                let heading = if number == 0 { heading } else { "" };
+                text += &format!("{heading:MARGIN$}{line}\n");
+            }
+        }
+        text.push('\n');
+        for problem in &self.problems {
+            text += &format!("{:MARGIN$}{}\n", name(problem.severity), problem.message);
+        }
+        text + &self.verdict()
+    }
+
+    fn about_dataset(&self) -> Vec<String> {
+        vec![format!("{}, {}", self.args.dataset.display(), self.dataset.dialect)]
+    }
+
+    fn about_frames(&self) -> Vec<String> {
+        let dataset = self.dataset;
+        let mut listed = format!("{} listed, {} found", dataset.listed, problems::found(dataset));
+        if !dataset.missing.is_empty() {
+            listed += &format!(", {} missing", dataset.missing.len());
+        }
+        let same = !dataset.val.is_empty() && dataset.val == dataset.test;
+        vec![format!(
+            "{listed}; {} to train on, {} to validate, {} to test{}",
+            dataset.train.len(),
+            dataset.val.len(),
+            dataset.test.len(),
+            if same { " (the same)" } else { "" }
+        )]
+    }
+
+    fn about_images(&self) -> Vec<String> {
+        let dataset = self.dataset;
+        let sizes: Vec<String> = (self.survey.optics.sizes.iter().take(4))
+            .map(|([width, height], frames)| match self.survey.optics.sizes.len() {
+                1 => format!("{width}x{height}"),
+                _ => format!("{width}x{height} ({})", count(*frames, "frame")),
+            })
+            .collect();
+        let more = if self.survey.optics.sizes.len() > sizes.len() { ", …" } else { "" };
+        let range = if dataset.is_hdr { "scene-linear" } else { "sRGB" };
+        let alpha = dataset.frames.iter().filter(|frame| frame.has_alpha).count();
+        let alpha = match (alpha, dataset.is_cutout) {
+            (0, _) => "opaque".to_owned(),
+            (_, true) => format!("cut out by alpha in {}", count(alpha, "frame")),
+            (_, false) => format!("alpha in {}, opaque in the first", count(alpha, "frame")),
+        };
+        vec![format!("{}{more} pixels; {range}; {alpha}", sizes.join(", "))]
+    }
+
+    fn about_cameras(&self) -> Vec<String> {
+        let optics = &self.survey.optics;
+        let lenses = match &optics.lenses[..] {
+            [(kind, _)] => format!("{} lens", kind.name()),
+            several => {
+                let each = several.iter().map(|(kind, frames)| format!("{} ({frames})", kind.name()));
+                format!("lenses: {}", each.collect::<Vec<_>>().join(", "))
+            }
+        };
+        let sets = count(self.dataset.distinct_cameras(), "set");
+        let pixels = |value: f64| format!("{value:.1}");
+        let degrees = |value: f64| format!("{value:.1}°");
+        let [fx, fy] = optics.focal_px.map(|focal| focal.tell(pixels));
+        let focal = if fx == fy { format!("{fx} px") } else { format!("{fx} px in x, {fy} px in y") };
+        let [x, y] = optics.fov_degrees.map(|fov| fov.tell(degrees));
+        vec![
+            format!("{sets} of intrinsics; {lenses}; principal point {}", center(&optics.center_off)),
+            format!("focal length {focal}"),
+            format!("field of view {x} across, {y} down"),
+        ]
+    }
+
+    fn about_box(&self) -> Vec<String> {
+        let bounds = &self.dataset.bounds;
+        let cubes = match bounds.cascades {
+            1 => "one cube".to_owned(),
+            cascades => format!("inner cube {} wide, {cascades} cascades", length(2.0 * bounds.half)),
+        };
+        vec![
+            format!(
+                "{} to {}, {} wide",
+                point(bounds.min()),
+                point(bounds.max()),
+                length(2.0 * bounds.outer_half())
+            ),
+            format!("{cubes}; {}", bounds.source),
+        ]
+    }
+
+    fn about_coverage(&self) -> Vec<String> {
+        let coverage = &self.survey.coverage;
+        let (outer, inner) = (coverage.outer(), coverage.inner());
+        let mut line = format!("the box fills {} of the pictures", outer.tell(percent));
+        if self.dataset.bounds.cascades > 1 {
+            line += &format!(", its inner cube {}", inner.tell(percent));
+        }
+        let mut lines = vec![line];
+        if outer.min < 0.5 * outer.median {
+            lines.push(format!("least in {}", self.names_in_text(&coverage.worst)));
+        }
+        lines
+    }
+
+    fn about_photos(&self) -> Vec<String> {
+        let Some(gallery) = &self.gallery else { return Vec::new() };
+        let relative = |value: f64, spread: &Spread| value / spread.median.max(f64::MIN_POSITIVE);
+        let (sharpness, brightness) = (gallery.sharpness(), gallery.brightness());
+        let stops = |value: f64| format!("{:+.1}", relative(value, &brightness).max(1e-9).log2());
+        vec![format!(
+            "{} decoded; sharpness {:.1} to {:.1} times the median, brightness {} to {} stops from the median",
+            gallery.looks.len(),
+            relative(sharpness.min, &sharpness),
+            relative(sharpness.max, &sharpness),
+            stops(brightness.min),
+            stops(brightness.max),
+        )]
+    }
+
+    fn names_in_text(&self, frames: &[usize]) -> String {
+        frames.iter().map(|&index| self.dataset.frames[index].name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    fn verdict(&self) -> String {
+        let number = |severity| self.problems.iter().filter(|problem| problem.severity == severity).count();
+        let (errors, warnings) = (number(Severity::Error), number(Severity::Warning));
+        match (errors, warnings) {
+            (0, 0) => "ready to train; nothing looks wrong".to_owned(),
+            (0, warnings) => format!("a training can begin; {}", count(warnings, "warning")),
+            (errors, 0) => format!("a training would fail; {}", count(errors, "error")),
+            (errors, warnings) => {
+                format!("a training would fail; {}, {}", count(errors, "error"), count(warnings, "warning"))
+            }
+        }
+    }
+}
+
+fn name(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Error => "error",
+        Severity::Warning => "warning",
+        Severity::Note => "note",
+    }
+}
+
+/// Where principal points lie.
+fn center([x, y]: &[Spread; 2]) -> String {
+    let most = [x.min, x.max, y.min, y.max].into_iter().fold(0.0, |most: f64, off| most.max(off.abs()));
+    if most < 5e-4 {
+        return "in the middle".to_owned();
+    }
+    let side = |off: f64, before: &str, after: &str| {
+        let way = if off < 0.0 { before } else { after };
+        format!("{:.1} % {way}", 100.0 * off.abs())
+    };
+    let typical = format!("{}, {}", side(x.median, "left", "right"), side(y.median, "above", "below"));
+    match x.max - x.min < 5e-4 && y.max - y.min < 5e-4 {
+        true => format!("{typical} of the middle"),
+        false => format!("typically {typical} of the middle, at most {}", percent(most)),
+    }
+}
+
+fn about_gaze(gaze: &Gaze, views: usize) -> Vec<String> {
+    let focus = match gaze.meets {
+        true => format!("the optical axes meet near {}", point(gaze.focus)),
+        false => format!("the optical axes do not meet; taken for the focus: {}", point(gaze.focus)),
+    };
+    let mut lines = vec![focus, format!("distance of the cameras from it {}", gaze.distance.tell(length))];
+    if views > 1 {
+        lines.push(format!(
+            "{} of the cameras see it; their axes pass it at {} of the distance, at worst {}",
+            percent(gaze.seeing),
+            percent(gaze.miss.median),
+            percent(gaze.miss.max)
+        ));
+    }
+    lines.push(match gaze.arrangement {
+        Arrangement::Single => "a single camera".to_owned(),
+        Arrangement::Parallel { within_degrees } => {
+            format!("all look the same way, within {within_degrees:.1}°")
+        }
+        Arrangement::Facing { within_degrees } => {
+            format!("all look from one side, within {within_degrees:.0}° of their mean")
+        }
+        Arrangement::Around { covered_degrees, elevation_degrees: [low, high] } => {
+            format!("from {covered_degrees:.0}° around, {low:.0}° to {high:.0}° above")
+        }
+        Arrangement::Scattered => "they look outwards or past each other".to_owned(),
+    });
+    lines
+}
+
+fn about_memory(memory: &Memory) -> Vec<String> {
+    let device = match (&memory.adapter, memory.is_cpu) {
+        (Some(name), true) => format!("{name}, whose memory is the host's"),
+        (Some(name), false) => name.clone(),
+        (None, _) => "a GPU".to_owned(),
+    };
+    let parts = [
+        (memory.photos, "photos"),
+        (memory.training, "the field and its samples"),
+        (memory.viewing, "test views"),
+    ];
+    let parts: Vec<_> = parts
+        .into_iter()
+        .filter(|part| part.0 > 0)
+        .map(|(size, of)| format!("{} {of}", bytes(size)))
+        .collect();
+    let mut lines = vec![
+        format!("{} on {device}: {}", bytes(memory.device()), parts.join(", ")),
+        format!("{} on the host besides", bytes(memory.host)),
+    ];
+    if let Some(most) = memory.most_photos {
+        lines[0] += &format!("; room for {:.0} times the photos", most as f64 / memory.photos.max(1) as f64);
+    }
+    lines.push(format!("the finest of the grid's levels has {} cells along an axis", memory.finest));
+    lines
+}
+
+fn point(at: DVec3) -> String {
+    format!("({}, {}, {})", length(at.x), length(at.y), length(at.z))
+}
