@@ -1,22 +1,13 @@
 //! Datasets as they are found in the wild, and as they should not be.
 
-use std::path::{Path, PathBuf};
+mod shared;
+
+use std::path::Path;
 
 use nerf::camera::Lens;
 use nerf::dataset::{Dataset, HoldOut, OpenOptions, read_cameras};
 use nerf::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
-
-/// A folder of the shared data, or `None` with a line on stderr where it is not there.
-fn shared(name: &str) -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
-    let root = std::env::var_os("NERF_SHARED").map_or_else(beside, PathBuf::from);
-    let path = root.join(name);
-    if !path.exists() {
-        eprintln!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
-}
+use shared::shared;
 
 fn open(path: &Path) -> Dataset {
     Dataset::open(path, &OpenOptions::default()).expect("a valid dataset")

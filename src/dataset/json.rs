@@ -23,6 +23,9 @@ pub(super) fn parse(text: &str) -> Result<Value> {
     })
 }
 
+/// What to do about the value of a key.
+pub(super) const REMEDY: &str = "correct or remove it";
+
 /// What a value is, for messages.
 pub(super) fn describe(value: &Value) -> String {
     match value {
@@ -74,9 +77,9 @@ impl<'a> Fields<'a> {
         let Some(value) = self.get(key) else {
             return Ok(None);
         };
-        let number =
-            real(value).with_context(|| format!("`{key}` must be a number, found {}", describe(value)))?;
-        ensure!(number.is_finite(), "`{key}` must be a finite number, found {number}");
+        let number = real(value)
+            .with_context(|| format!("`{key}` must be a number, found {}; {REMEDY}", describe(value)))?;
+        ensure!(number.is_finite(), "`{key}` must be a finite number, found {number}; {REMEDY}");
         Ok(Some(number))
     }
 
@@ -86,7 +89,7 @@ impl<'a> Fields<'a> {
         if let Some(number) = number {
             ensure!(
                 number > 0.0 && number < limit,
-                "`{key}` must be above 0 and below {limit}, found {number}"
+                "`{key}` must be above 0 and below {limit}, found {number}; {REMEDY}"
             );
         }
         Ok(number)
@@ -96,7 +99,7 @@ impl<'a> Fields<'a> {
         match self.get(key) {
             None => Ok(None),
             Some(Value::String(text)) => Ok(Some(text)),
-            Some(other) => bail!("`{key}` must be a text, found {}", describe(other)),
+            Some(other) => bail!("`{key}` must be a text, found {}; {REMEDY}", describe(other)),
         }
     }
 
@@ -106,7 +109,7 @@ impl<'a> Fields<'a> {
             None => Ok(None),
             Some(Value::Bool(flag)) => Ok(Some(*flag)),
             Some(Value::Number(number)) => Ok(Some(number.as_f64() != Some(0.0))),
-            Some(other) => bail!("`{key}` must be true or false, found {}", describe(other)),
+            Some(other) => bail!("`{key}` must be true or false, found {}; {REMEDY}", describe(other)),
         }
     }
 
@@ -114,7 +117,7 @@ impl<'a> Fields<'a> {
         match self.get(key) {
             None => Ok(None),
             Some(Value::Array(list)) => Ok(Some(list)),
-            Some(other) => bail!("`{key}` must be a list, found {}", describe(other)),
+            Some(other) => bail!("`{key}` must be a list, found {}; {REMEDY}", describe(other)),
         }
     }
 
@@ -123,7 +126,10 @@ impl<'a> Fields<'a> {
         let Some(Matrix { numbers, .. }) = self.matrix(key)? else {
             return Ok(None);
         };
-        ensure!(numbers.iter().all(|number| number.is_finite()), "`{key}` must have finite numbers only");
+        ensure!(
+            numbers.iter().all(|number| number.is_finite()),
+            "`{key}` must have finite numbers only; {REMEDY}"
+        );
         Ok(Some(numbers))
     }
 
@@ -133,10 +139,12 @@ impl<'a> Fields<'a> {
             return Ok(None);
         };
         let Value::Array(rows) = value else {
-            bail!("`{key}` must be a list of numbers, found {}", describe(value));
+            bail!("`{key}` must be a list of numbers, found {}; {REMEDY}", describe(value));
         };
         let mut numbers = Vec::with_capacity(16);
-        flatten(rows, &mut numbers).with_context(|| format!("`{key}` must be a list of numbers"))?;
+        if let Err(stranger) = flatten(rows, &mut numbers) {
+            bail!("`{key}` must be a list of numbers, found {} in it; {REMEDY}", describe(stranger));
+        }
         let columns = rows.first().and_then(Value::as_array).map(Vec::len);
         Ok(Some(Matrix { rows: columns.map(|columns| [rows.len(), columns]), numbers }))
     }
@@ -148,12 +156,13 @@ pub(super) struct Matrix {
     pub(super) numbers: Vec<f64>,
 }
 
-fn flatten(list: &[Value], numbers: &mut Vec<f64>) -> Result<()> {
+/// Appends the numbers of a list, or finds the first value in it that is none.
+fn flatten<'a>(list: &'a [Value], numbers: &mut Vec<f64>) -> std::result::Result<(), &'a Value> {
     for value in list {
         match value {
             Value::Array(list) => flatten(list, numbers)?,
             Value::Null => numbers.push(f64::NAN),
-            other => numbers.push(real(other).with_context(|| format!("found {} in it", describe(other)))?),
+            other => numbers.push(real(other).ok_or(other)?),
         }
     }
     Ok(())

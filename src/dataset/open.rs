@@ -257,7 +257,7 @@ fn build(located: Vec<Located>, notes: &mut Notes) -> (Vec<Frame>, Vec<(Option<S
 }
 
 fn declared_size(entry: &Entry) -> Option<[u32; 2]> {
-    let size = entry.intrinsics.declared_size?.round().max(glam::DVec2::ONE);
+    let size = entry.intrinsics.likely_size()?.round().max(glam::DVec2::ONE);
     Some([size.x as u32, size.y as u32])
 }
 

@@ -57,7 +57,9 @@ pub(super) fn read(fields: Fields, axes: Axes, owner: &str, notes: &mut Notes) -
     let translation = matrix.w_axis.truncate();
     ensure!(
         translation.is_finite() && translation.abs().max_element() < FARTHEST,
-        "`{key}` puts the camera at {translation}; expected a position within {FARTHEST:e} world units"
+        "`{key}` must put the camera within {FARTHEST:e} world units, found a distance of {:e}; correct the frame or \
+         take it out",
+        translation.length()
     );
     let linear = DMat3::from_mat4(matrix) * DMat3::from_diagonal(axes.signs());
     Ok(Some(DAffine3 { matrix3: orthonormal(key, linear, owner, notes)?, translation }))
@@ -99,7 +101,9 @@ fn stated(
     if KEYS.iter().any(|(key, _)| fields.0.contains_key(*key)) {
         return Ok(None);
     }
-    bail!("`transform_matrix` is missing; every frame needs a camera-to-world matrix")
+    bail!(
+        "`transform_matrix` is missing; every frame needs a camera-to-world matrix, so write it or take the frame out"
+    )
 }
 
 /// The 4x4 matrix with the translation in its last column and the last row 0 0 0 w.
@@ -114,7 +118,9 @@ fn upright(key: &str, stated: &Matrix, owner: &str, notes: &mut Notes) -> Result
             }
         }
         12 | 16 => rows[..numbers.len()].copy_from_slice(numbers),
-        other => bail!("`{key}` must have 4x4 or 3x4 numbers, found {other}"),
+        other => {
+            bail!("`{key}` must have 4x4 or 3x4 numbers, found {other}; write it camera-to-world, row by row")
+        }
     }
     if rows.iter().any(|number| !number.is_finite()) {
         return Ok(None);
@@ -148,7 +154,7 @@ fn orthonormal(key: &str, linear: DMat3, owner: &str, notes: &mut Notes) -> Resu
     let determinant = unit.determinant();
     ensure!(
         determinant.is_finite() && determinant.abs() > 1e-6 * volume,
-        "`{key}` is singular, with the columns {} {} {}; a camera needs three independent axes",
+        "`{key}` must have three independent axes, found the columns {} {} {}; correct the frame or take it out",
         linear.x_axis,
         linear.y_axis,
         linear.z_axis
@@ -167,8 +173,7 @@ fn orthonormal(key: &str, linear: DMat3, owner: &str, notes: &mut Notes) -> Resu
     let change = change.into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     ensure!(
         change < 0.1,
-        "`{key}` is not a rotation: its columns have the lengths {:.3?} or are not perpendicular; \
-         export rigid poses",
+        "`{key}` must be a rotation, found columns of the lengths {:.3?} or not perpendicular; export rigid poses",
         lengths.map(|length| length * size)
     );
     if change > 1e-3 {

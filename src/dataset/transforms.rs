@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::Split;
 use super::intrinsics::{self, Intrinsics, Stated};
-use super::json::{self, Fields, describe, shortened};
+use super::json::{self, Fields, REMEDY, describe, shortened};
 use super::notes::{Note, Notes, Severity};
 use super::pose::{self, Axes, handedness};
 use outline::Section;
@@ -100,15 +100,15 @@ fn label(index: usize, key: Option<&str>, frame: &Value) -> String {
 }
 
 /// What the objects around the frames say for all of them.
-struct File {
-    split: Option<Split>,
+struct File<'a> {
+    section: &'a Section<'a>,
     axes: Axes,
     intrinsics: Vec<Stated>,
 }
 
-impl File {
-    fn read(section: &Section, notes: &mut Notes) -> Result<Self> {
-        let mut file = Self { split: section.split, axes: Axes::OpenGl, intrinsics: Vec::new() };
+impl<'a> File<'a> {
+    fn read(section: &'a Section<'a>, notes: &mut Notes) -> Result<Self> {
+        let mut file = Self { section, axes: Axes::OpenGl, intrinsics: Vec::new() };
         for &fields in &section.around {
             let axes = Axes::of(fields)?;
             file.axes = if file.axes == Axes::OpenGl { axes } else { file.axes };
@@ -126,7 +126,7 @@ impl File {
         notes: &mut Notes,
     ) -> Result<Option<Entry>> {
         let Value::Object(map) = frame else {
-            bail!("expected an object, found {}", describe(frame));
+            bail!("expected an object, found {}; {REMEDY}", describe(frame));
         };
         let fields = Fields(map);
         let file_path = file_path(fields, key)?;
@@ -141,7 +141,7 @@ impl File {
             return Ok(None);
         };
         let label = label.to_owned();
-        Ok(Some(Entry { label, intrinsics, world_from_camera, split: self.split, file_path }))
+        Ok(Some(Entry { label, intrinsics, world_from_camera, split: self.section.split, file_path }))
     }
 }
 
@@ -156,12 +156,15 @@ fn file_path(fields: Fields, key: Option<&str>) -> Result<String> {
     for name_key in NAME_KEYS {
         if let Some(path) = fields.text(name_key)? {
             let path = path.trim().strip_prefix("file://").unwrap_or(path.trim()).replace('\\', "/");
-            ensure!(!path.is_empty(), "`{name_key}` is empty; every frame needs the name of its image");
+            ensure!(
+                !path.is_empty(),
+                "`{name_key}` is empty; every frame needs the name of its image, so write it"
+            );
             return Ok(path);
         }
     }
     key.map(|key| key.replace('\\', "/"))
-        .context("`file_path` is missing; every frame needs the name of its image")
+        .context("`file_path` is missing; every frame needs the name of its image, so write it")
 }
 
 /// Exporters write NaN where an image was not registered.
@@ -183,88 +186,160 @@ fn report_unposed(unposed: &[String], posed: usize, notes: &mut Notes) -> Result
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+    use serde_json::{Map, json};
 
-    const POSE: &str = "[[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]";
-
-    fn one(frame: &str, file: &str) -> Result<Listing> {
-        parse(&format!(
-            "{{\"frames\": [{{\"file_path\": \"a\\\\b.png\", \"transform_matrix\": {POSE}{frame}}}]{file}}}"
-        ))
+    /// A file with one frame, each with more keys.
+    pub(in crate::dataset) fn one(frame: Value, file: Value) -> Listing {
+        let mut all =
+            json!({"file_path": "a", "transform_matrix": [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]});
+        let object = |value: Value| value.as_object().cloned().unwrap_or_else(Map::new);
+        all.as_object_mut().expect("an object").extend(object(frame));
+        let mut document = object(file);
+        document.insert("frames".to_owned(), json!([all]));
+        let text = Value::Object(document).to_string();
+        parse(&text).unwrap_or_else(|error| panic!("{text}: {error:#}"))
     }
 
-    fn camera(frame: &str, file: &str, size: [u32; 2]) -> crate::camera::Camera {
-        let entry = &one(frame, file).expect("valid").frames[0];
-        entry.intrinsics.camera(size, entry.world_from_camera).0
+    fn messages(listing: &Listing) -> String {
+        listing.notes().iter().map(|note| format!("{note}\n")).collect()
+    }
+
+    /// Frames of these names at rising positions.
+    fn frames(names: &[&str]) -> Vec<Value> {
+        let frame = |(x, name): (usize, &&str)| json!({"file_path": name, "transform_matrix": [1,0,0,x, 0,1,0,0, 0,0,1,4]});
+        names.iter().enumerate().map(frame).collect()
     }
 
     #[test]
-    fn the_frame_comes_before_the_file_and_pixels_before_angles() {
-        let file = ", \"camera_angle_x\": 1.5707963267948966, \"fl_x\": 40, \"w\": 100, \"h\": 50";
-        let focal = |frame| camera(frame, file, [100, 50]).focal_px.to_array();
-        assert_eq!(focal(""), [40.0, 40.0]);
-        assert_eq!(focal(", \"fl_x\": 30, \"fl_y\": 20"), [30.0, 20.0]);
-        assert!((focal(", \"x_fov\": 90")[0] - 50.0).abs() < 1e-12);
-        assert!((focal(", \"camera_angle_y\": 1.5707963267948966")[1] - 25.0).abs() < 1e-12);
-        assert_eq!(focal(", \"K\": [[8,0,3],[0,9,4],[0,0,1]]"), [8.0, 9.0]);
-        assert_eq!(focal(", \"intrinsics\": {\"fl_x\": 7}"), [7.0, 7.0]);
+    fn listed_names_are_found_in_many_spellings() {
+        let names =
+            ["./images/1.png", r"images\2.png", "images/3", "deep/images/4.jpg", "left/5.png", "right/5.png"];
+        let split = |name: &str| {
+            let document =
+                json!({"fl_x": 9, "test_filenames": [name, "images/1.png"], "frames": frames(&names)});
+            let listing = parse(&document.to_string()).expect("valid");
+            let chosen = listing.frames.iter().skip(1).filter(|entry| entry.split == Some(Split::Test));
+            chosen.map(|entry| entry.world_from_camera.translation.x as usize).collect::<Vec<_>>()
+        };
+        for (name, expected) in [
+            ("images/2.png", 1),
+            (r".\images\2.png", 1),
+            ("images/2", 1),
+            (r"C:\data\images\2.png", 1),
+            ("/home/me/images/3.jpg", 2),
+            ("images//./3", 2),
+            ("images/4.jpg", 3),
+            ("4", 3),
+            ("left/5.png", 4),
+            ("/data/right/5", 5),
+        ] {
+            assert_eq!(split(name), [expected], "{name}");
+        }
+        assert!(split("5.png").is_empty(), "two frames have that name");
+        assert!(split("images/9.png").is_empty());
     }
 
     #[test]
-    fn pixels_scale_with_the_image_they_belong_to() {
-        let file = ", \"fl_x\": 40, \"cx\": 60, \"cy\": 20, \"w\": 100, \"h\": 50.4";
-        let small = camera("", file, [50, 25]);
-        assert!((small.center_px.x - 30.0).abs() < 1e-12 && (small.focal_px.x - 20.0).abs() < 1e-12);
-        let same = camera("", file, [100, 50]);
-        assert_eq!(same.center_px.to_array(), [60.0, 20.0]);
-        let row_major = camera(", \"K\": [8,0,3, 0,9,4, 0,0,1]", "", [6, 8]);
-        let column_major = camera(", \"K\": [8,0,0, 0,9,0, 3,4,1]", "", [6, 8]);
-        assert_eq!(row_major.center_px, column_major.center_px);
+    fn frames_are_found_in_many_places() {
+        let two = || frames(&["a.png", "b.png"]);
+        let named = json!({"a": {"transform_matrix": [1,0,0,0, 0,1,0,0, 0,0,1,4]}});
+        let (train, test) = (Some(Split::Train), Some(Split::Test));
+        for (document, expected) in [
+            (json!({"fl_x": 9, "frames": two()}), vec![None, None]),
+            (json!({"fl_x": 9, "frames": named}), vec![None]),
+            (json!({"fl_x": 9, "data": {"frames": two()}}), vec![None, None]),
+            (json!({"data": {"fl_x": 9, "frames": two()}}), vec![None, None]),
+            (
+                json!({"fl_x": 9, "test": {"frames": two()}, "train": {"frames": named}}),
+                vec![test, test, train],
+            ),
+            (json!({"fl_x": 9, "frames": two(), "test_frames": frames(&["c"])}), vec![train, train, test]),
+        ] {
+            let listing =
+                parse(&document.to_string()).unwrap_or_else(|error| panic!("{document}: {error:#}"));
+            let splits: Vec<_> = listing.frames.iter().map(|entry| entry.split).collect();
+            assert_eq!(splits, expected, "{document}");
+        }
+        for key in NAME_KEYS {
+            let text = json!({"fl_x": 9, "frames": two()}).to_string().replace("file_path", key);
+            assert_eq!(parse(&text).expect("valid").frames[1].file_path, "b.png");
+        }
     }
 
     #[test]
     fn boxes_mean_what_instant_ngp_means() {
-        let scene = |file: &str| {
-            let file = format!(", \"fl_x\": 1{file}");
-            one("", &file).expect("valid").scene_box
+        let scene = |file: Value| {
+            let mut file = file;
+            file["fl_x"] = json!(1);
+            one(json!({}), file).scene_box
         };
-        assert_eq!(scene(""), None);
-        let plain = scene(", \"aabb_scale\": 3").expect("has a box");
+        assert_eq!(scene(json!({})), None);
+        let plain = scene(json!({"aabb_scale": 3})).expect("has a box");
         assert_eq!((plain.scale, plain.aabb_scale), (0.33, 4));
-        let explicit = scene(", \"aabb\": [[0, 0, 0], [2, 4, 1]], \"scale\": 9").expect("a box");
-        assert_eq!(explicit.scale, 0.25);
-        assert_eq!(explicit.offset.to_array(), [0.25, 0.0, 0.375]);
-        assert_eq!(scene(", \"aabb_scale\": 1000").expect("a box").aabb_scale, 128);
+        let explicit = scene(json!({"aabb": [[0, 0, 0], [2, 4, 1]], "scale": 9})).expect("a box");
+        assert_eq!((explicit.scale, explicit.offset.to_array()), (0.25, [0.25, 0.0, 0.375]));
+        assert_eq!(scene(json!({"aabb_scale": 1000})).expect("a box").aabb_scale, 128);
+        let mitsuba = scene(json!({"aabb_scale": 1, "from_mitsuba": true})).expect("a box");
+        assert_eq!((mitsuba.scale, mitsuba.offset.x), (0.66, 0.165));
     }
 
-    #[test]
-    fn split_lists_are_read() {
-        let listing = one("", ", \"fl_x\": 1, \"test_filenames\": [\"./a/b.png\"]").expect("valid");
-        assert_eq!(listing.frames[0].split, Some(Split::Test));
-        assert_eq!(listing.frames[0].file_path, "a/b.png");
-        assert_eq!(listing.dialect, "nerfstudio");
+    /// The pose of one frame and what is said about it.
+    fn pose(frame: Value, file: Value) -> (DAffine3, String) {
+        let (mut frame, mut file) = (frame, file);
+        file["fl_x"] = json!(9);
+        if frame.get("transform_matrix").is_none() {
+            frame["transform_matrix"] = Value::Null;
+        }
+        let listing = one(frame, file);
+        (listing.frames[0].world_from_camera, messages(&listing))
     }
 
     #[test]
     fn matrices_of_every_shape_become_rigid() {
-        let pose = |matrix: &str| {
-            let text = format!(
-                "{{\"fl_x\": 1, \"frames\": [{{\"file_path\": \"a\", \"transform_matrix\": {matrix}}}]}}"
-            );
-            parse(&text).map(|listing| listing.frames[0].world_from_camera)
-        };
-        let expected = pose(POSE).expect("valid");
+        let read = |matrix: Value| pose(json!({"transform_matrix": matrix}), json!({}));
+        let (expected, said) = read(json!([[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]));
+        assert_eq!(said, "");
         for same in [
-            "[[1,0,0,1],[0,1,0,2],[0,0,1,3]]",
-            "[1,0,0,1, 0,1,0,2, 0,0,1,3, 0,0,0,1]",
-            "[[0.5,0,0,1],[0,0.5,0,2],[0,0,0.5,3],[0,0,0,1]]",
-            "[[2,0,0,2],[0,2,0,4],[0,0,2,6],[0,0,0,2]]",
+            json!([[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3]]),
+            json!([1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]),
+            json!([["1", 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, "3.0"]]),
+            json!([[0.5, 0, 0, 1], [0, 0.5, 0, 2], [0, 0, 0.5, 3], [0, 0, 0, 1]]),
+            json!([[1e-90, 0, 0, 1], [0, 1e-90, 0, 2], [0, 0, 1e-90, 3], [0, 0, 0, 1]]),
+            json!([[2, 0, 0, 2], [0, 2, 0, 4], [0, 0, 2, 6], [0, 0, 0, 2]]),
         ] {
-            assert_eq!(pose(same).expect("valid"), expected, "{same}");
+            assert_eq!(read(same.clone()).0, expected, "{same}");
         }
-        let noisy = pose("[[1.02,0.01,0,1],[0,0.99,0,2],[0,0,1,3]]").expect("repaired");
+        let (noisy, said) = read(json!([[1.02, 0.01, 0, 1], [0, 0.99, 0, 2], [0, 0, 1, 3]]));
         let product = noisy.matrix3.transpose() * noisy.matrix3;
         assert!(product.abs_diff_eq(glam::DMat3::IDENTITY, 1e-14));
+        assert!(said.contains("not quite perpendicular"), "{said}");
+    }
+
+    #[test]
+    fn matrices_of_other_conventions_become_right_up_back() {
+        let rows = json!([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]);
+        let (expected, said) = pose(json!({"transform_matrix": rows}), json!({}));
+        assert_eq!((expected.matrix3.x_axis, said.as_str()), (glam::DVec3::Y, ""));
+        for same in [
+            json!([[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [1, 2, 3, 1]]),
+            json!([0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 1, 2, 3, 1]),
+            json!([[0, 1, 0], [-1, 0, 0], [0, 0, 1], [1, 2, 3]]),
+        ] {
+            let (found, said) = pose(json!({"transform_matrix": same}), json!({}));
+            assert_eq!(found, expected, "{same}");
+            assert!(said.contains("it was transposed"), "{said}");
+        }
+        let open_cv = json!([[0, 1, 0, 1], [1, 0, 0, 2], [0, 0, -1, 3]]);
+        assert_eq!(pose(json!({"camtoworld": open_cv}), json!({})).0, expected);
+        assert_eq!(pose(json!({"transform_matrix": open_cv}), json!({"from_na": true})).0, expected);
+        let mitsuba = json!([[0, 1, 0, 1], [-1, 0, 0, 2], [0, 0, 1, 3]]);
+        assert_eq!(pose(json!({"transform_matrix": mitsuba}), json!({"from_mitsuba": true})).0, expected);
+        let later = json!([[0, -1, 0, 2], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]);
+        let moving = json!({"transform_matrix_start": rows, "transform_matrix_end": later});
+        let (found, said) = pose(moving, json!({}));
+        assert_eq!(found.translation.to_array(), [1.5, 2.0, 3.0]);
+        assert!(said.contains("halfway"), "{said}");
     }
 }

@@ -3,7 +3,7 @@
 use anyhow::{Result, bail, ensure};
 use glam::DVec2;
 
-use crate::dataset::json::Fields;
+use crate::dataset::json::{Fields, REMEDY};
 use crate::dataset::notes::{Notes, Severity};
 
 const KEYS: [&str; 5] = ["K", "intrinsics", "intrinsic_matrix", "camera_matrix", "camera_intrinsics"];
@@ -30,17 +30,17 @@ pub(super) fn read(fields: Fields, owner: &str, notes: &mut Notes) -> Result<Opt
             let center = if row == DVec2::ZERO { DVec2::new(n[last], n[last + 1]) } else { row };
             (stride, DVec2::new(n[0], n[stride + 1]), center)
         }
-        other => bail!("`{key}` must have 3x3 numbers, found {other}"),
+        other => bail!("`{key}` must have 3x3 numbers, or fx, fy, cx, cy, found {other}; {REMEDY}"),
     };
     ensure!(
         focal_px.min_element() > 1e-6 && focal_px.max_element() < 1e9,
-        "the focal lengths in `{key}` must be above 0 and below 1e9, found {} and {}",
+        "the focal lengths in `{key}` must be above 0 and below 1e9, found {} and {}; {REMEDY}",
         focal_px.x,
         focal_px.y
     );
     ensure!(
         center_px.abs().max_element() < 1e9,
-        "the principal point in `{key}` must be below 1e9 pixels, found {}, {}",
+        "the principal point in `{key}` must be below 1e9 pixels, found {}, {}; {REMEDY}",
         center_px.x,
         center_px.y
     );

@@ -3,7 +3,7 @@
 use anyhow::{Result, ensure};
 use glam::DVec2;
 
-use crate::dataset::json::Fields;
+use crate::dataset::json::{Fields, REMEDY};
 use crate::dataset::notes::{Note, Severity};
 
 /// Width and height in pixels as far as they are known; may be fractional.
@@ -32,7 +32,7 @@ impl Extent {
         for (width, height) in [("w", "h"), ("width", "height"), ("image_width", "image_height")] {
             let (width, height) = (fields.positive(width, 1e6)?, fields.positive(height, 1e6)?);
             let least = width.unwrap_or(1.0).min(height.unwrap_or(1.0));
-            ensure!(least >= 1.0, "`w` and `h` must be at least 1 pixel, found {least}");
+            ensure!(least >= 1.0, "`w` and `h` must be at least 1 pixel, found {least}; {REMEDY}");
             known = known.or(Self { width, height, origin: Origin::Declared });
         }
         Ok(known)

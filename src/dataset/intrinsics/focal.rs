@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 use glam::DVec2;
 
 use super::extent::Measure;
-use crate::dataset::json::Fields;
+use crate::dataset::json::{Fields, REMEDY};
 use crate::dataset::notes::{Notes, Severity};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +22,7 @@ pub(super) fn pixels(fields: Fields) -> Result<Option<DVec2>> {
         let (fx, fy) = (fields.positive(x, 1e9)?, fields.positive(y, 1e9)?);
         if let Some(either) = fx.or(fy) {
             let least = fx.unwrap_or(either).min(fy.unwrap_or(either));
-            ensure!(least > 1e-6, "`{x}` and `{y}` must be above 0.000001 pixels, found {least:e}");
+            ensure!(least > 1e-6, "`{x}` and `{y}` must be above 0.000001 pixels, found {least:e}; {REMEDY}");
             return Ok(Some(DVec2::new(fx.unwrap_or(either), fy.unwrap_or(either))));
         }
     }
@@ -81,7 +81,7 @@ fn angle(fields: Fields, key: &'static str, owner: &str, notes: &mut Notes) -> R
     let in_radians = key.starts_with("camera_angle");
     ensure!(
         stated > 1e-6 && stated < 180.0,
-        "`{key}` must be above 0 and below {}, found {stated}",
+        "`{key}` must be above 0 and below {}, found {stated}; {REMEDY}",
         if in_radians { "pi, in radians" } else { "180, in degrees" }
     );
     let is_degrees = !in_radians || stated >= PI;

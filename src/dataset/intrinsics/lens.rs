@@ -94,12 +94,12 @@ impl Stated {
         let by_flag = flag(fields)?;
         let fisheye = fields.flag("is_fisheye")?;
         let projection = match (model, by_flag, fisheye) {
-            (Some((_, model)), Some((key, other)), _) if model != other => {
-                bail!("`{key}` contradicts `camera_model`, which is {model:?}; keep the one that is right")
+            (Some((name, model)), Some((key, other)), _) if model != other => {
+                bail!("`{key}` contradicts `camera_model`, found {name}; keep the one that is right")
             }
-            (Some((_, model)), _, Some(true)) if model != Projection::Fisheye => bail!(
-                "`is_fisheye` contradicts `camera_model`, which is {model:?}; keep the one that is right"
-            ),
+            (Some((name, model)), _, Some(true)) if model != Projection::Fisheye => {
+                bail!("`is_fisheye` contradicts `camera_model`, found {name}; keep the one that is right")
+            }
             (Some((_, Projection::Fisheye)), _, Some(false)) => {
                 let message = "`is_fisheye` is false although `camera_model` is a fisheye; the model counts";
                 notes.frame(Severity::Warning, owner, message);
@@ -264,4 +264,80 @@ fn refuse_terms(fields: Fields) -> Result<()> {
         ensure!(value == 0.0, "`{key}` is {value}; this term of the lens is not modelled; {ADVICE}");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::transforms::tests::one;
+    use serde_json::{Value, json};
+
+    /// The lens of one frame, and what is said about it.
+    fn read(frame: Value, mut file: Value) -> (Lens, String) {
+        file["fl_x"] = json!(9);
+        let listing = one(frame, file);
+        let entry = &listing.frames[0];
+        let lens = entry.intrinsics.camera([8, 8], entry.world_from_camera).0.lens;
+        (lens, listing.notes().iter().map(ToString::to_string).collect())
+    }
+
+    const fn open_cv(k: [f64; 4], p: [f64; 2]) -> Lens {
+        Lens::OpenCv { k, p }
+    }
+
+    #[test]
+    fn names_are_synonyms_in_any_spelling() {
+        for (projection, names) in PROJECTIONS {
+            let expected = match projection {
+                Projection::Perspective => Lens::Pinhole,
+                Projection::Fisheye => Lens::Fisheye { k: [0.0; 4] },
+                Projection::Equirectangular => Lens::Equirectangular,
+                Projection::Orthographic => Lens::Orthographic,
+            };
+            for name in names {
+                for spelling in [(*name).to_owned(), name.to_lowercase(), format!("CameraModel.{name}")] {
+                    let found = read(json!({}), json!({"camera_model": spelling, "k1": 0})).0;
+                    assert_eq!(found, expected, "{spelling}");
+                }
+            }
+        }
+        assert_eq!(read(json!({}), json!({"camera_type": "spherical"})).0, Lens::Equirectangular);
+        assert_eq!(read(json!({}), json!({"camera_type": "iPhone 12"})).0, Lens::Pinhole);
+    }
+
+    #[test]
+    fn coefficients_never_share_slots() {
+        let lens = |file: Value| read(json!({}), file).0;
+        assert_eq!(lens(json!({"k3": 0.3, "k4": 0.4})), open_cv([0.0, 0.0, 0.3, 0.4], [0.0; 2]));
+        assert_eq!(lens(json!({"p1": 0.3, "p2": 0.4})), open_cv([0.0; 4], [0.3, 0.4]));
+        assert_eq!(lens(json!({"k1": "0.1", "p2": "-4"})), open_cv([0.1, 0.0, 0.0, 0.0], [0.0, -4.0]));
+        let nerfstudio = json!({"distortion_params": [1, 2, 3, 4, 5, 6]});
+        assert_eq!(lens(nerfstudio), open_cv([1.0, 2.0, 3.0, 4.0], [5.0, 6.0]));
+        let five = json!({"dist_coeffs": [[1, 2, 3, 4, 5]]});
+        assert_eq!(lens(five), open_cv([1.0, 2.0, 5.0, 0.0], [3.0, 4.0]));
+        assert_eq!(lens(json!({"distortion": [1, 2, 3, 4]})), open_cv([1.0, 2.0, 0.0, 0.0], [3.0, 4.0]));
+        assert_eq!(lens(json!({"distortion": {"k2": 2}})), open_cv([0.0, 2.0, 0.0, 0.0], [0.0; 2]));
+        let fisheye = json!({"is_fisheye": true, "distortion": [1, 2, 3, 4]});
+        assert_eq!(lens(fisheye), Lens::Fisheye { k: [1.0, 2.0, 3.0, 4.0] });
+    }
+
+    #[test]
+    fn the_frame_goes_before_the_file() {
+        let file = || json!({"camera_model": "OPENCV_FISHEYE", "k1": 0.1, "k2": 0.2});
+        assert_eq!(read(json!({}), file()).0, Lens::Fisheye { k: [0.1, 0.2, 0.0, 0.0] });
+        let frame = json!({"camera_model": "OPENCV", "k1": 0.5});
+        assert_eq!(read(frame, file()).0, open_cv([0.5, 0.0, 0.0, 0.0], [0.0; 2]));
+        let frame = json!({"is_fisheye": true, "k1": 0});
+        assert_eq!(read(frame, json!({"k1": 1})).0, Lens::Fisheye { k: [0.0; 4] });
+    }
+
+    #[test]
+    fn contradictions_that_can_be_read_are_reported() {
+        let (lens, said) = read(json!({}), json!({"camera_model": "PINHOLE", "k1": 0.1}));
+        assert_eq!(lens, open_cv([0.1, 0.0, 0.0, 0.0], [0.0; 2]));
+        assert!(said.contains("promises no distortion"), "{said}");
+        let (_, said) = read(json!({}), json!({"camera_model": "FISHEYE", "is_fisheye": false, "p1": 0.1}));
+        assert!(said.contains("the model counts") && said.contains("not modelled and ignored"), "{said}");
+        assert_eq!(read(json!({}), json!({"camera_model": "OPENCV", "k1": 0.1})).1, "");
+    }
 }

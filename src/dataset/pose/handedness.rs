@@ -59,9 +59,10 @@ fn leave_out(entries: &mut Vec<Entry>, mirrored: bool, notes: &mut Notes) {
     }
     let named = odd[..odd.len().min(3)].join(", ");
     let more = if odd.len() > 3 { ", …" } else { "" };
-    let handed = if mirrored { "mirrored" } else { "not mirrored" };
+    let verb = if odd.len() == 1 { "is" } else { "are" };
+    let handed = format!("{verb} {}mirrored", if mirrored { "" } else { "not " });
     notes.warn(format!(
-        "{} frames are {handed}, unlike the others, and left out: {named}{more}; export them again",
+        "{} of the frames {handed}, unlike the others, and left out: {named}{more}; export them again",
         odd.len()
     ));
     entries.retain(|entry| is_mirrored(entry) != mirrored);
@@ -92,7 +93,8 @@ struct Convergence {
 }
 
 impl Convergence {
-    /// `None` for fewer than three cameras, and where the axes are too parallel to meet.
+    /// `None` for fewer than three cameras, where the axes are too parallel to meet, and for cameras that
+    /// look everywhere.
     fn of(entries: &[Entry]) -> Option<Self> {
         let poses = || entries.iter().map(|entry| entry.world_from_camera);
         let count = entries.len() as f64;
@@ -102,7 +104,8 @@ impl Convergence {
         };
         // The point nearest to all axes: the sum of the projections across them is inverted.
         let sum = poses().fold(DMat3::ZERO, |sum, pose| sum + across(pose));
-        if entries.len() < 3 || sum.determinant() < 1e-3 * count.powi(3) {
+        let looks_everywhere = entries.iter().any(|entry| entry.intrinsics.is_whole_sphere());
+        if entries.len() < 3 || looks_everywhere || sum.determinant() < 1e-3 * count.powi(3) {
             return None;
         }
         let target = poses().fold(DVec3::ZERO, |sum, pose| sum + across(pose) * pose.translation);
@@ -190,7 +193,8 @@ mod tests {
         let listing = ring(20, 1.0, |index| index == 7).expect("valid");
         assert_eq!(listing.frames.len(), 19);
         assert!(
-            messages(listing).contains("1 frames are mirrored, unlike the others, and left out: frame 7")
+            messages(listing)
+                .contains("1 of the frames is mirrored, unlike the others, and left out: frame 7")
         );
         let listing = ring(20, 1.0, |index| index != 7).expect("valid");
         assert_eq!(listing.frames.len(), 19);

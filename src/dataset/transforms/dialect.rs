@@ -87,3 +87,44 @@ fn is_from_colmap(matrix: &Matrix) -> bool {
 fn is_from_metashape(matrix: &Matrix) -> bool {
     matrix.numbers == [0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::dataset::transforms::{parse, tests::one};
+    use serde_json::json;
+
+    #[test]
+    fn tools_are_told_by_what_only_they_write() {
+        let own = json!({"fl_x": 9, "cx": 4, "cy": 3, "w": 8, "h": 6});
+        let with = |key: &str| {
+            let mut frame = own.clone();
+            frame[key] = json!(0.1);
+            frame
+        };
+        let unturned = json!({"camera_model": "OPENCV", "orientation_override": "none"});
+        let colmap = json!({"applied_transform": [[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0]], "fl_x": 9});
+        let metashape = json!({"applied_transform": [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0]]});
+        for (frame, file, expected) in [
+            (json!({}), json!({"camera_angle_x": 0.7}), "blender"),
+            (json!({}), json!({"aabb_scale": 4, "camera_angle_x": 0.7}), "instant-ngp"),
+            (json!({"sharpness": 4}), json!({"camera_angle_x": 0.7}), "instant-ngp"),
+            (with("depth_path"), json!({"integer_depth_scale": 1e-4}), "instant-ngp (NeRFCapture)"),
+            (own.clone(), json!({"camera_model": "OPENCV"}), "nerfstudio"),
+            (with("colmap_im_id"), json!({"camera_model": "OPENCV"}), "nerfstudio (COLMAP)"),
+            (json!({}), colmap, "nerfstudio (COLMAP)"),
+            (own.clone(), metashape, "nerfstudio (Metashape)"),
+            (own.clone(), unturned.clone(), "nerfstudio (Polycam)"),
+            (with("k1"), unturned, "nerfstudio (RealityCapture)"),
+            (own.clone(), json!({"ply_file_path": "reconstruction.ply"}), "nerfstudio (OpenDroneMap)"),
+            (own.clone(), json!({"test_frames": []}), "nerfstudio (ScanNet++)"),
+            (own.clone(), json!({"from_na": true}), "NeuS2"),
+            (own.clone(), json!({}), "per-frame intrinsics"),
+        ] {
+            assert_eq!(one(frame.clone(), file.clone()).dialect, expected, "{frame} {file}");
+        }
+        let list = r#"[{"file_path": "a", "fl_x": 9, "transform": [1,0,0,0, 0,1,0,0, 0,0,1,4]}]"#;
+        assert_eq!(parse(list).expect("valid").dialect, "nerfstudio (exported cameras)");
+        let other = list.replace("transform", "camtoworld").replace("file_path", "rgb_path");
+        assert_eq!(parse(&other).expect("valid").dialect, "SDFStudio");
+    }
+}

@@ -4,7 +4,7 @@ use anyhow::{Result, bail, ensure};
 use serde_json::Value;
 
 use crate::dataset::Split;
-use crate::dataset::json::{Fields, describe, shortened};
+use crate::dataset::json::{Fields, REMEDY, describe, shortened};
 
 /// Some frames of a document.
 pub(super) struct Section<'a> {
@@ -24,7 +24,9 @@ pub(super) fn sections(document: &Value) -> Result<Vec<Section<'_>>> {
             return Ok(vec![Section { split: None, around: Vec::new(), frames: frames(document, "")? }]);
         }
         Value::Object(map) => map,
-        other => bail!("expected a JSON object with a list `frames`, found {}", describe(other)),
+        other => {
+            bail!("expected a JSON object with a list `frames`, found {}; name another file", describe(other))
+        }
     };
     let file = Fields(map);
     let mut found = within(file, &[])?;
@@ -80,7 +82,7 @@ fn frames<'a>(value: &'a Value, key: &str) -> Result<Vec<(Option<&'a str>, &'a V
     match value {
         Value::Array(list) => Ok(list.iter().map(|frame| (None, frame)).collect()),
         Value::Object(map) => Ok(map.iter().map(|(name, frame)| (Some(name.as_str()), frame)).collect()),
-        other => bail!("`{key}` must be a list, found {}", describe(other)),
+        other => bail!("`{key}` must be a list, found {}; {REMEDY}", describe(other)),
     }
 }
 

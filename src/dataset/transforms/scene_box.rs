@@ -4,7 +4,7 @@ use anyhow::{Result, bail, ensure};
 use glam::DVec3;
 use serde_json::Value;
 
-use crate::dataset::json::Fields;
+use crate::dataset::json::{Fields, REMEDY};
 use crate::dataset::notes::Notes;
 use crate::dataset::pose::Axes;
 
@@ -25,7 +25,7 @@ impl SceneBox {
         if !file.has(&["aabb_scale", "scale", "offset", "aabb"]) {
             return Ok(None);
         }
-        let asked = file.positive("aabb_scale", f64::INFINITY)?.unwrap_or(1.0);
+        let asked = file.positive("aabb_scale", 1e6)?.unwrap_or(1.0);
         let aabb_scale = (asked.ceil().clamp(1.0, 128.0) as u32).next_power_of_two();
         if f64::from(aabb_scale) != asked {
             notes
@@ -40,29 +40,29 @@ impl SceneBox {
         let offset = match file.get("offset") {
             Some(Value::Array(_)) => match file.numbers("offset")?.as_deref() {
                 Some(&[x, y, z]) => DVec3::new(x, y, z),
-                _ => bail!("`offset` must be one number or three"),
+                _ => bail!("`offset` must be one number or three; {REMEDY}"),
             },
             _ => DVec3::splat(file.number("offset")?.unwrap_or(default_offset)),
         };
-        let scale = file.positive("scale", f64::INFINITY)?.unwrap_or(default_scale);
+        let scale = file.positive("scale", 1e30)?.unwrap_or(default_scale);
         ensure!(
             scale.recip().is_finite() && (offset / scale).is_finite(),
-            "`scale` {scale:e} with `offset` {offset} puts the box at no finite place"
+            "`scale` {scale:e} with `offset` {offset} puts the box at no finite place; {REMEDY}"
         );
         Ok(Some(Self { scale, offset, aabb_scale }))
     }
 
     fn around(corners: &[f64], aabb_scale: u32) -> Result<Self> {
         let &[x0, y0, z0, x1, y1, z1] = corners else {
-            bail!("`aabb` must be [[x, y, z], [x, y, z]], found {} numbers", corners.len());
+            bail!("`aabb` must be [[x, y, z], [x, y, z]], found {} numbers; {REMEDY}", corners.len());
         };
         let (a, b) = (DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1));
         let side = (b - a).abs().max_element();
         let offset = DVec3::splat(0.5) - 0.5 * (a + b) / side;
-        ensure!(side > 0.0, "`aabb` has no extent: both corners are {a}");
+        ensure!(side > 0.0, "`aabb` must be two different corners, found {a} twice; {REMEDY}");
         ensure!(
             side.is_finite() && side.recip().is_finite() && offset.is_finite(),
-            "`aabb` from {a} to {b} is too large or too small; expected corners in world units"
+            "`aabb` must have corners in world units, found {side:e} from one to the other; {REMEDY}"
         );
         Ok(Self { scale: side.recip(), offset, aabb_scale })
     }

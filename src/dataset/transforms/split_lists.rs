@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::Entry;
 use crate::dataset::Split;
-use crate::dataset::json::{Fields, describe, shortened};
+use crate::dataset::json::{Fields, REMEDY, describe, shortened};
 use crate::dataset::notes::Notes;
 
 /// The lists of nerfstudio, in rising priority for a frame that several of them name.
@@ -24,7 +24,7 @@ pub(super) fn assign(file: Fields, entries: &mut [Entry], notes: &mut Notes) -> 
     for (split, key) in KEYS {
         for name in file.list(key)?.unwrap_or_default() {
             let Value::String(name) = name else {
-                bail!("`{key}` must list file names, found {}", describe(name));
+                bail!("`{key}` must list file names, found {}; {REMEDY}", describe(name));
             };
             listed += 1;
             let Some(found) = names.find(name) else {
@@ -46,19 +46,18 @@ pub(super) fn assign(file: Fields, entries: &mut [Entry], notes: &mut Notes) -> 
     );
     if let Some(first) = unknown.first() {
         notes.warn(format!(
-            "{} of {listed} names in the split lists are of no frame, beginning with {:?}",
+            "names in the split lists that no frame has: {} of {listed}, beginning with {:?}",
             unknown.len(),
             shortened(first)
         ));
     }
     if moved > 0 {
-        notes.warn(format!(
-            "{moved} frames are named in several split lists; test goes before val before train"
-        ));
+        notes
+            .warn(format!("frames named in several split lists: {moved}; test goes before val before train"));
     }
     let left = entries.iter().filter(|entry| entry.split.is_none()).count();
     if listed > 0 && left > 0 {
-        notes.note(format!("{left} frames are in no split list and not used"));
+        notes.note(format!("frames in no split list: {left}; they are not used"));
     }
     Ok(())
 }
