@@ -44,7 +44,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let result = sum.value + squared_times(exp_accurate(-0.5 * depth.value.x), background);
     let error = result - targets[index];
-    let weight = loss_weight(result);
+    let weight = loss_weight(result, targets[index]);
     rendered[index] = result;
     ray_errors[index] = weight * error * error + vec4(0.0, 0.0, 0.0, depth_squared_error(distance));
 

@@ -141,7 +141,7 @@ pub enum ColorLoss {
     Auto,
     /// The squared error.
     Squared,
-    /// The squared error over the square of the rendered colour.
+    /// The squared error over the mean square of rendered and photographed colour.
     Relative,
 }
 

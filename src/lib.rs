@@ -71,6 +71,7 @@ pub mod gpu;
 pub mod health;
 pub mod image;
 pub mod kernels;
+pub mod memory;
 pub mod metrics;
 pub mod model;
 pub mod orbit;

@@ -21,35 +21,34 @@ pub fn short(number: f64) -> String {
     }
 }
 
-/// A number of bytes.
+/// An amount of memory.
 #[must_use]
 pub fn bytes(count: u64) -> String {
-    const UNITS: [&str; 4] = ["KiB", "MiB", "GiB", "TiB"];
-    let mut number = count as f64;
-    let mut unit = "bytes";
-    for larger in UNITS {
-        if number < 1024.0 {
-            break;
-        }
-        (number, unit) = (number / 1024.0, larger);
+    const UNITS: [&str; 4] = ["bytes", "KiB", "MiB", "GiB"];
+    let mut unit = 0;
+    let mut value = count as f64;
+    while value >= 1024.0 && unit + 1 < UNITS.len() {
+        value /= 1024.0;
+        unit += 1;
     }
-    if number < 10.0 && unit != "bytes" {
-        format!("{number:.1} {unit}")
-    } else {
-        format!("{number:.0} {unit}")
-    }
+    let digits = usize::from(unit > 0 && value < 99.95);
+    format!("{value:.digits$} {}", UNITS[unit])
 }
 
-/// A length with four digits, in plain figures where that is short.
+/// A length with three or four digits, in plain figures where that is short.
 #[must_use]
 pub fn length(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-3..1e6).contains(&size) {
         return format!("{value:.2e}");
     }
-    let whole = if size < 1.0 { 0 } else { size.log10() as usize + 1 };
-    let text = format!("{value:.*}", 4usize.saturating_sub(whole.max(1)));
-    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0".to_owned() } else { text }
+    if size == 0.0 {
+        return "0".to_owned();
+    }
+    // Small numbers are shown with three digits, as those below them are with three decimals.
+    let power = size.log10().floor();
+    let decimals = if power < -1.0 { 2.0 - power } else { (3.0 - power).clamp(0.0, 3.0) };
+    format!("{value:.*}", decimals as usize)
 }
 
 /// A part of a whole.
@@ -74,9 +73,10 @@ mod tests {
         let all = [0.25, 42.4, 119.0, 125.0, 7384.0].map(duration);
         assert_eq!(all, ["0.2 s", "42 s", "119 s", "2 min 05 s", "2 h 03 min"]);
         assert_eq!([7.0, 1234.0, 5.67e6].map(short), ["7", "1.2k", "5.7M"]);
-        assert_eq!([12, 4096, 23 << 20, 5 << 28].map(bytes), ["12 bytes", "4.0 KiB", "23 MiB", "1.2 GiB"]);
+        let memory = [7, 1536, 400 << 20, 8_294_400_000].map(bytes);
+        assert_eq!(memory, ["7 bytes", "1.5 KiB", "400 MiB", "7.7 GiB"]);
         let lengths = [0.0, 1e-9, -0.04321, 1.5, -23.456, 123456.7, 2e7].map(length);
-        assert_eq!(lengths, ["0", "1.00e-9", "-0.043", "1.500", "-23.46", "123457", "2.00e7"]);
+        assert_eq!(lengths, ["0", "1.00e-9", "-0.0432", "1.500", "-23.46", "123457", "2.00e7"]);
         assert_eq!([0.0, 0.012, 0.5, 1.0].map(percent), ["0 %", "1.2 %", "50 %", "100 %"]);
         assert_eq!([count(1, "frame"), count(3, "frame")], ["1 frame", "3 frames"]);
     }

@@ -141,7 +141,7 @@ impl Ray {
         let scales = Scales::new(objective, &input, &want, &offsets);
         let case = |what: &str| format!("ray {number}, {what}");
         for (x, &error) in errors.iter().enumerate().take(3) {
-            let weight = objective.loss.weights(want.rendered)[x];
+            let weight = objective.loss.weights(want.rendered, self.target)[x];
             let size = (want.rendered[x].abs() + self.target[x].abs()).powi(2) * weight;
             tally.value(error.into(), want.loss_terms[x], size, || case("squared error"));
         }
@@ -171,7 +171,7 @@ impl Scales {
         offsets: &[f64],
     ) -> Self {
         let m = f64::from(ray.rays_in_batch);
-        let weights = objective.loss.weights(output.rendered);
+        let weights = objective.loss.weights(output.rendered, ray.target);
         let both = |x: usize| output.rendered[x].abs() + ray.target[x].abs();
         let residual: [f64; 4] = std::array::from_fn(|x| weights[x] * both(x) / (2.0 * m));
         let size_of_depth: f64 = output.weights.iter().zip(offsets).map(|(w, offset)| w * offset.abs()).sum();

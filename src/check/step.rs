@@ -84,7 +84,7 @@ pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
 /// Mean squared error of red, green and blue, as they count.
 fn color_error(output: &BatchOutput, batch: &[TrainingRay], objective: Objective) -> f64 {
     let squares = |(got, ray): (&[f64; 4], &TrainingRay)| {
-        let weights = objective.loss.weights(*got);
+        let weights = objective.loss.weights(*got, ray.target);
         (0..3).map(|x| weights[x] * (got[x] - ray.target[x]).powi(2)).sum::<f64>()
     };
     let sum: f64 = output.rendered.iter().zip(batch).map(squares).sum();

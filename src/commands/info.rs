@@ -9,7 +9,7 @@ use super::{Failed, Session, needs};
 use crate::cli::info::Info;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
-use memory::Memory;
+use memory::Estimate;
 use nerf::dataset::{Dataset, OpenOptions};
 use nerf::file::write_atomically;
 use nerf::health::map::{self, Drawing};
@@ -34,7 +34,7 @@ struct Report<'a> {
     /// `None` where the photos were not looked at.
     gallery: Option<Gallery>,
     /// `None` where there is nothing to train on.
-    memory: Option<Memory>,
+    memory: Option<Estimate>,
     /// The parts of the program that stay out.
     left_out: Vec<&'static str>,
     /// Worst first.
@@ -75,8 +75,8 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
     }
     let mut memory = None;
     if !dataset.train.is_empty() {
-        let estimate = Memory::estimate(dataset, session)?;
-        problems.extend(estimate.problems(dataset));
+        let estimate = Estimate::of(dataset, session)?;
+        problems.extend(estimate.problems());
         memory = Some(estimate);
     }
     let background = nerf::config::Config::default().background;

@@ -3,10 +3,14 @@
 //! ```text
 //! loss = 1/(4M) Σ_x v_x (R_x − g_x)²  +  λ/M D²        D = Σ_i w_i (t_i − g_t)
 //! v_x = 1                     squared, and always for the opacity
-//! v_x = 1 / (R_x² + 0.01)     relative; a constant as far as gradients go (Mildenhall et al. 2022, eq. 4)
+//! v_x = 1 / ((R_x² + g_x²)/2 + 0.01)     relative; a constant as far as gradients go
 //! d_c_xi = v_x (R_x − g_x)/(2M) w_i
 //! d_s_i  = Σ_x v_x (R_x − g_x)/(2M) dR_x/ds_i  +  2λ/M D dD/ds_i
 //! ```
+//!
+//! The relative error follows Mildenhall et al. 2022 (RawNeRF, eq. 4), whose weight is `1/(R_x + ε)²`. With that, a
+//! pixel that the field does not show yet outweighs all others by its brightness squared; relative to both colours, an
+//! error is at most 2.
 //!
 //! `D` is composited like a colour `t_i − g_t` over 0, so that the transparent part of a ray has no error, and its
 //! derivative is that of a colour.
@@ -14,7 +18,7 @@
 use super::Transmittance;
 use super::composite::{CompositeInput, CompositeOutput, composite, d_rendered_by_s};
 
-/// Added to the square of the colour that an error is relative to.
+/// Added to the square of the colours that an error is relative to.
 pub const RELATIVE_FLOOR: f64 = 0.01;
 
 /// How errors count.
@@ -28,9 +32,9 @@ pub struct Loss {
 
 impl Loss {
     /// `v_x` of colour and opacity.
-    pub fn weights(&self, rendered: [f64; 4]) -> [f64; 4] {
+    pub fn weights(&self, rendered: [f64; 4], target: [f64; 4]) -> [f64; 4] {
         let weight = |x: usize| match self.is_relative && x < 3 {
-            true => 1.0 / (rendered[x] * rendered[x] + RELATIVE_FLOOR),
+            true => 1.0 / (0.5 * (rendered[x] * rendered[x] + target[x] * target[x]) + RELATIVE_FLOOR),
             false => 1.0,
         };
         std::array::from_fn(weight)
@@ -47,7 +51,7 @@ pub fn composite_with(
 ) -> CompositeOutput {
     let mut output = composite(convention, ray);
     let m = f64::from(ray.rays_in_batch.max(1));
-    let weights = loss.weights(output.rendered);
+    let weights = loss.weights(output.rendered, ray.target);
     let residual: [f64; 4] = std::array::from_fn(|x| output.rendered[x] - ray.target[x]);
     output.loss_terms = std::array::from_fn(|x| weights[x] * residual[x] * residual[x]);
     output.loss = output.loss_terms.iter().sum::<f64>() / (4.0 * m);
@@ -115,7 +119,7 @@ mod tests {
         let loss = Loss { is_relative: true, depth: 0.7 };
         for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
             let output = composite_with(loss, convention, &RAY, &OFFSETS);
-            let weights = loss.weights(output.rendered);
+            let weights = loss.weights(output.rendered, RAY.target);
             assert!((output.loss - loss_at(loss, weights, convention, &RAY)).abs() < 1e-12);
             for i in 0..3 {
                 let at = |h: f64| {

@@ -1,10 +1,10 @@
 //! The report as text.
 
-use super::memory::Memory;
+use super::memory::Estimate;
 use super::{Report, problems};
 use glam::DVec3;
 use nerf::health::{Arrangement, Gaze, Severity, Spread};
-use nerf::words::{bytes, count, length, percent};
+use nerf::words::{bytes, count, length, percent, short};
 
 /// Width of the headings at the left.
 const MARGIN: usize = 10;
@@ -217,31 +217,22 @@ fn about_gaze(gaze: &Gaze, views: usize) -> Vec<String> {
     lines
 }
 
-fn about_memory(memory: &Memory) -> Vec<String> {
-    let device = match (&memory.adapter, memory.is_cpu) {
+fn about_memory(estimate: &Estimate) -> Vec<String> {
+    let Estimate { memory, adapter, is_cpu, most_photo_bytes, finest, .. } = estimate;
+    let device = match (adapter, is_cpu) {
         (Some(name), true) => format!("{name}, whose memory is the host's"),
         (Some(name), false) => name.clone(),
         (None, _) => "a GPU".to_owned(),
     };
-    let parts = [
-        (memory.photos, "photos"),
-        (memory.training, "the field and its samples"),
-        (memory.viewing, "test views"),
-    ];
-    let parts: Vec<_> = parts
-        .into_iter()
-        .filter(|part| part.0 > 0)
-        .map(|(size, of)| format!("{} {of}", bytes(size)))
-        .collect();
-    let mut lines = vec![
-        format!("{} on {device}: {}", bytes(memory.device()), parts.join(", ")),
-        format!("{} on the host besides", bytes(memory.host)),
-    ];
-    if let Some(most) = memory.most_photos {
-        lines[0] += &format!("; room for {:.0} times the photos", most as f64 / memory.photos.max(1) as f64);
-    }
-    lines.push(format!("the finest of the grid's levels has {} cells along an axis", memory.finest));
-    lines
+    let room = most_photo_bytes.map_or_else(String::new, |most| {
+        format!("; room for {} times as many", short(most as f64 / memory.photo_bytes.max(1) as f64))
+    });
+    vec![
+        format!("{} on {device}", bytes(memory.device_bytes)),
+        format!("of which the photos take {}{room}", bytes(memory.photo_bytes)),
+        format!("{} on the host besides, while loading", bytes(memory.host_bytes)),
+        format!("the finest level of the grid has {finest} cells along an axis"),
+    ]
 }
 
 fn point(at: DVec3) -> String {

@@ -104,14 +104,14 @@ impl Report<'_> {
     }
 
     fn memory_json(&self) -> Option<Value> {
-        let memory = self.memory.as_ref()?;
+        let estimate = self.memory.as_ref()?;
         Some(json!({
-            "host_bytes": memory.host,
-            "device_bytes": memory.device(),
-            "photo_bytes": memory.photos,
-            "most_photo_bytes": memory.most_photos,
-            "device_is_host": memory.is_cpu,
-            "adapter": memory.adapter,
+            "host_bytes": estimate.memory.host_bytes,
+            "device_bytes": estimate.memory.device_bytes,
+            "photo_bytes": estimate.memory.photo_bytes,
+            "most_photo_bytes": estimate.most_photo_bytes,
+            "device_is_host": estimate.is_cpu,
+            "adapter": estimate.adapter,
         }))
     }
 

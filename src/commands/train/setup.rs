@@ -9,8 +9,9 @@ use nerf::checkpoint::{About, Checkpoint, FORMAT, Splits};
 use nerf::config::{Background, Config};
 use nerf::dataset::Dataset;
 use nerf::gpu::Gpu;
-use nerf::kernels::Plan;
+use nerf::image::Image;
 use nerf::kernels::training::accumulation_name;
+use nerf::kernels::{Needs, Plan};
 use nerf::model::finest_resolution;
 use nerf::orbit::Orbit;
 use nerf::schedule::Budget;
@@ -19,6 +20,8 @@ use std::path::Path;
 
 /// Seconds of training on a CPU when nothing is said.
 const CPU_SECONDS: f64 = 300.0;
+/// Photos that tell how bright a linear scene is.
+const PHOTOS_FOR_GREY: usize = 8;
 /// Steps on a GPU when nothing is said.
 const GPU_STEPS: u32 = 20_000;
 
@@ -164,7 +167,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
         rays: config.batch.first_rays,
         seconds: 0.0,
         budget: Budget::default(),
-        needs: needs::of(dataset),
+        needs: Needs { grey: grey(dataset)?, ..needs::of(dataset) },
         splits: Splits { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) },
         image_size: [orbit.width, orbit.height],
         has_alpha: dataset.is_cutout,
@@ -172,6 +175,20 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
         config,
         bounds,
     })
+}
+
+/// Brightness of a typical pixel of linear photos, which the field then takes for 1; 1 for others.
+fn grey(dataset: &Dataset) -> Result<f32> {
+    if !dataset.is_hdr {
+        return Ok(1.0);
+    }
+    let count = dataset.train.len();
+    let few = (0..count.min(PHOTOS_FOR_GREY)).map(|i| dataset.train[i * count / count.min(PHOTOS_FOR_GREY)]);
+    let images = dataset.load_images(&few.collect::<Vec<_>>(), &|_| {})?;
+    let logs: Vec<f64> = images.iter().filter_map(Image::brightness).map(f64::ln).collect();
+    let grey = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp() as f32;
+    ensure!(grey.is_normal(), "the photos are as dark or as bright as {grey:e}: scale them to about 1");
+    Ok(grey)
 }
 
 /// The description of an earlier training with what the command line changes; the field's size stays.
