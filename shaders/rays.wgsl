@@ -20,7 +20,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let pixel = vec2(f32(position % camera.width), f32(position / camera.width)) + 0.5;
     let ray = camera_ray(camera, pixel);
     ray_store(index, ray);
-    depth_target_store(index, camera.first_row, drawn, 1.0 / max(-dot(ray.direction, camera.back), 1e-6));
+    depth_target_store(index, camera.first_row, drawn, 1.0 / max(lens_depth(camera, ray.direction), 1e-6));
     let color = photo_color(camera.first_row, drawn);
     let background = background_color(step.stream, index);
     targets[index] = vec4(color.rgb + (1.0 - color.a) * background, color.a);

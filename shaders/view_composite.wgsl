@@ -1,5 +1,5 @@
-// Renders the rays of a view: colour, opacity and mean depth along the view axis.
-// Needs: counters, camera, exp, sum, transmittance.
+// Renders the rays of a view: colour, opacity and mean depth as its lens defines it.
+// Needs: counters, camera, lens, exp, sum, transmittance.
 
 var<storage, read> counters: Counters;
 var<storage, read> cameras: array<Camera>;
@@ -20,8 +20,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let span = kept_spans[index];
-    let origin = cameras[0].origin;
-    let forward = -cameras[0].back;
+    let camera = cameras[0];
     var depth = 0.0;
     var sum = vec4(0.0);
     var distance = 0.0;
@@ -30,7 +29,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let tau = optical_depth(step.x, step.y);
         let weight = exp_accurate(-transmittance_depth(depth, tau)) * opacity(tau);
         sum += weight * vec4(color_load(i).rgb, 1.0);
-        distance += weight * dot(samples_load(kept_rows_load(i).x).xyz - origin, forward);
+        distance += weight * lens_depth(camera, samples_load(kept_rows_load(i).x).xyz - camera.origin);
         depth += tau;
     }
     view_color[index] = sum;

@@ -4,6 +4,7 @@
 //! the top-left corner of the image, +x right and +y down; the centre of pixel `(i, j)` is
 //! `(i + 0.5, j + 0.5)`.
 
+mod branch;
 mod equirectangular;
 mod fisheye;
 mod lens;

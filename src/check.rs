@@ -29,7 +29,6 @@ mod setup;
 pub mod step;
 mod subject;
 mod tally;
-pub mod targets;
 pub mod view;
 mod workbench;
 
@@ -47,12 +46,13 @@ struct Check {
 }
 
 /// In the order of a training step.
-const CHECKS: [Check; 16] = [
+const CHECKS: [Check; 17] = [
     Check { name: "exponentials", run: |subject| Ok(vec![exponential::exponentials(subject)?]) },
     Check { name: "random numbers", run: |subject| Ok(vec![random::random_numbers(subject)?]) },
-    Check { name: "lenses", run: |subject| Ok(vec![lens::lens_model(subject)?]) },
+    Check { name: "lenses", run: lens::lens_models },
     Check { name: "rays of views", run: rays::view_rays },
-    Check { name: "rays of a training", run: |subject| Ok(vec![targets::training_rays(subject)?]) },
+    Check { name: "rays of large views", run: rays::sharp_rays },
+    Check { name: "rays of a training", run: |subject| Ok(vec![rays::training_rays(subject)?]) },
     Check { name: "marching", run: marching::marched_samples },
     Check { name: "hash grid", run: |subject| Ok(vec![grid::features(subject)?]) },
     Check { name: "selection", run: |subject| Ok(vec![selection::selected_samples(subject)?]) },

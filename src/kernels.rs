@@ -14,6 +14,7 @@ pub(crate) use part;
 pub mod color;
 pub mod density;
 pub mod layer;
+pub mod lens;
 pub mod marching;
 mod memory;
 pub mod occupancy;
@@ -26,6 +27,7 @@ mod workspace;
 pub use shared::{Camera, Counters, Step};
 pub use workspace::Workspace;
 
+use crate::camera::LensKind;
 use crate::config::{Accumulation, Background, ColorLoss, Config, Transmittance};
 use crate::gpu::Gpu;
 use crate::gpu::kernel::{Kernel, Shared};
@@ -34,6 +36,7 @@ use crate::gpu::tensor::Memory;
 use crate::model::{DENSITY_OUTPUTS, Layout, Level};
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fmt::Display;
 
 /// A file of WGSL under its name.
@@ -42,8 +45,9 @@ pub type Part = (&'static str, &'static str);
 pub(crate) const RANDOM: Part = part!("common/random.wgsl");
 const STEP: Part = part!("common/step.wgsl");
 const COUNTERS: Part = part!("common/counters.wgsl");
-const RAY: Part = part!("common/ray.wgsl");
-const CAMERA: Part = part!("common/camera.wgsl");
+pub(crate) const RAY: Part = part!("common/ray.wgsl");
+pub(crate) const SINE: Part = part!("common/sine.wgsl");
+pub(crate) const CAMERA: Part = part!("common/camera.wgsl");
 const RAY_LOAD: Part = part!("common/ray_load.wgsl");
 const RAY_STORE: Part = part!("common/ray_store.wgsl");
 const OCCUPANCY: Part = part!("common/occupancy.wgsl");
@@ -93,8 +97,8 @@ pub mod dispatch {
 /// What a scene needs, apart from the configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Needs {
-    /// Some camera has lens distortion.
-    pub lens: bool,
+    /// The lenses that cameras have; at least one.
+    pub lenses: BTreeSet<LensKind>,
     /// Some image has alpha.
     pub alpha: bool,
     /// Pixels are linear floats.
@@ -117,7 +121,7 @@ impl Default for Needs {
     /// One opaque 8-bit photo of a pinhole camera, of a bounded scene.
     fn default() -> Self {
         Self {
-            lens: false,
+            lenses: [LensKind::Pinhole].into(),
             alpha: false,
             hdr: false,
             deep: false,
@@ -279,11 +283,17 @@ impl Plan {
         Kernel::new(gpu, &source, &layouts)
     }
 
-    /// The text of a kernel, before it is linked.
+    /// The text of a kernel, before it is linked. Cameras bring the lenses that the scene needs.
     #[must_use]
     pub fn source(&self, label: &str, parts: &[Part]) -> Source {
+        let add = |source: Source, (name, text): &Part| source.part(name, *text);
         let source = self.numbers(self.dimensions(Source::new(label).memory(self.memory)));
-        parts.iter().fold(source, |source, (name, text)| source.part(name, *text))
+        let source = parts.iter().fold(source, add);
+        if !parts.contains(&CAMERA) {
+            return source;
+        }
+        let lenses = &self.needs.lenses;
+        lens::parts(lenses).iter().fold(source, add).part("lens choice", lens::choice(lenses))
     }
 
     fn dimensions(&self, source: Source) -> Source {
@@ -347,10 +357,6 @@ impl Plan {
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         let background = config.background.solid().map(|value| value / self.needs.grey);
         source.constant("BACKGROUND", vec3(background))
-    }
-
-    fn lens(&self) -> Part {
-        if self.needs.lens { part!("lens/opencv.wgsl") } else { part!("lens/pinhole.wgsl") }
     }
 
     fn stepping(&self) -> Part {

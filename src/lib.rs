@@ -28,7 +28,8 @@
 //! # A training in code
 //!
 //! ```no_run
-//! use nerf::{config::Config, dataset::Dataset, gpu, kernels::{Needs, Plan}, model, train, views::Views};
+//! use nerf::{camera::LensKind, config::Config, dataset::Dataset, gpu, kernels::{Needs, Plan}};
+//! use nerf::{model, train, views::Views};
 //! use std::{path::Path, sync::Arc};
 //!
 //! # fn main() -> anyhow::Result<()> {
@@ -40,6 +41,7 @@
 //! let finest = model::finest_resolution(config.grid.base, &dataset.bounds, &cameras);
 //! let layout = model::Layout::new(&config, finest);
 //! let needs = Needs {
+//!     lenses: LensKind::among(&cameras),
 //!     alpha: images.iter().any(|image| image.has_alpha),
 //!     hdr: dataset.is_hdr,
 //!     cascades: dataset.bounds.cascades,

@@ -1,12 +1,13 @@
 //! The renderer: a trained field seen by any camera, in chunks of pixels.
 
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, LensKind};
 use crate::dataset::Bounds;
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
 use crate::kernels::{self, Counters, Plan, Step, Workspace, color, density, marching, viewing};
 use anyhow::{Result, bail};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Names of the buffers that a renderer shares with a trainer, or fills from a checkpoint.
@@ -26,7 +27,7 @@ pub struct View {
     pub height: u32,
     /// Premultiplied colour in the field's colour space (sRGB or linear), without background, and opacity.
     pub color: Vec<[f32; 4]>,
-    /// Mean distance along the view axis in world units; 0 where the opacity is below 1e-3.
+    /// Mean depth in world units, as [`LensKind::depth_is_distance`] defines it; 0 where the opacity is below 1e-3.
     pub depth: Vec<f32>,
 }
 
@@ -37,20 +38,26 @@ pub struct Renderer {
     workspace: Workspace,
     stages: Vec<Stage>,
     bounds: Bounds,
-    lens: bool,
     /// Scene-linear brightness of a field colour of 1.
     grey: f32,
+    lenses: BTreeSet<LensKind>,
     rays: u32,
 }
 
 impl Renderer {
-    /// A renderer of the field whose parameters `field` holds; `lens` links lens undistortion.
+    /// A renderer of the field whose parameters `field` holds, for cameras with `lenses`.
     ///
     /// # Errors
     /// When the adapter cannot hold a chunk or refuses a kernel.
-    pub fn new(gpu: &Arc<Gpu>, plan: &Plan, field: &Workspace, bounds: &Bounds, lens: bool) -> Result<Self> {
+    pub fn new(
+        gpu: &Arc<Gpu>,
+        plan: &Plan,
+        field: &Workspace,
+        bounds: &Bounds,
+        lenses: &BTreeSet<LensKind>,
+    ) -> Result<Self> {
         let mut plan = chunk_plan(plan);
-        plan.needs.lens = lens;
+        plan.needs.lenses.clone_from(lenses);
         let mut workspace = Workspace::default();
         for name in PARAMETERS {
             workspace.share(field, name);
@@ -61,8 +68,8 @@ impl Renderer {
         stages.extend(density::stages(gpu, &plan, &workspace)?);
         stages.extend(color::stages(gpu, &plan, &workspace, color::Selection::All)?);
         stages.push(viewing::composite(gpu, &plan, &workspace)?);
-        let (bounds, grey) = (bounds.clone(), plan.needs.grey);
-        Ok(Self { gpu: Arc::clone(gpu), workspace, stages, bounds, lens, grey, rays: 1024 })
+        let (gpu, bounds, lenses) = (Arc::clone(gpu), bounds.clone(), lenses.clone());
+        Ok(Self { gpu, workspace, stages, bounds, grey: plan.needs.grey, lenses, rays: 1024 })
     }
 
     /// Bytes on the device that a renderer of `plan` takes besides the parameters.
@@ -76,8 +83,14 @@ impl Renderer {
     /// # Errors
     /// When the device was lost, or the camera has a lens that was not linked.
     pub fn render(&mut self, camera: &Camera) -> Result<View> {
-        if camera.lens != Lens::Pinhole && !self.lens {
-            bail!("this renderer was built without lens distortion, and the camera has it");
+        let kind = camera.lens.kind();
+        if !self.lenses.contains(&kind) {
+            let linked: Vec<_> = self.lenses.iter().map(|kind| kind.name()).collect();
+            bail!(
+                "this renderer was built for the lenses {}, and the camera's is {}; name all lenses when building it",
+                linked.join(", "),
+                kind.name()
+            );
         }
         let pixels = camera.width as usize * camera.height as usize;
         let mut color = Vec::with_capacity(pixels);

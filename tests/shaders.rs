@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use nerf::camera::LensKind;
 use nerf::config::{Accumulation, Config};
 use nerf::gpu::banks::Capacity;
 use nerf::gpu::kernel::{Layout as StructLayout, Shared};
@@ -40,6 +41,17 @@ fn files() -> Vec<File> {
     files
 }
 
+/// The choice between the lenses of every set of cameras: a part that the plan writes.
+fn lens_choices() -> Vec<File> {
+    (1..1 << LensKind::ALL.len())
+        .map(|members: u32| {
+            let is_member = |kind: &LensKind| members >> (*kind as u32) & 1 == 1;
+            let kinds: BTreeSet<LensKind> = LensKind::ALL.into_iter().filter(is_member).collect();
+            (format!("lens choice {kinds:?}"), nerf::kernels::lens::choice(&kinds))
+        })
+        .collect()
+}
+
 /// What a part defines for others.
 fn definitions(text: &str) -> Vec<String> {
     let name =
@@ -62,7 +74,7 @@ fn definitions(text: &str) -> Vec<String> {
 
 fn plan(memory: Memory, cascades: u32) -> Plan {
     let config = Config::default();
-    let needs = Needs { lens: true, alpha: true, cascades, cameras: 3, ..Needs::default() };
+    let needs = Needs { alpha: true, cascades, cameras: 3, ..Needs::default() };
     let layout = Layout::new(&config, 2048);
     let product = Product { rows: 2, shared_weights: false };
     Plan { config, layout, needs, product, accumulation: Accumulation::Exchange, memory, chunks: 32 }
@@ -91,6 +103,7 @@ impl Linker {
         let capacity = Capacity::of(&wgpu::Limits::default(), plan.memory);
         let photos = |banks| (format!("photos in {banks} banks"), capacity.part(photos::NAME, banks));
         parts.extend([photos(1), photos(3)]);
+        parts.extend(lens_choices());
         let mut definers: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for (index, (_, text)) in parts.iter().enumerate() {
             for name in definitions(text) {
@@ -208,7 +221,6 @@ fn variants_are_interchangeable() {
         "background",
         "depth_loss",
         "depth_target",
-        "lens",
         "loss",
         "pixels",
         "position",

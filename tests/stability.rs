@@ -1,7 +1,7 @@
 //! Trainings that would break a careless trainer: each guard has a test that fails without it.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
-use nerf::camera::{Camera, Lens};
+use nerf::camera::{Camera, Lens, LensKind};
 use nerf::config::{Accumulation, Batch, Config, Grid, March, Network, Occupancy};
 use nerf::dataset::Bounds;
 use nerf::gpu::{Gpu, adapter};
@@ -95,6 +95,7 @@ impl Scene {
         let gpu = Arc::new(Gpu::open(&adapter).expect("it opens"));
         let (cameras, images, bounds) = (self.cameras(), self.images(), self.bounds());
         let needs = Needs {
+            lenses: LensKind::among(&cameras),
             alpha: self.has_alpha,
             hdr: images.iter().any(Image::is_hdr),
             cameras: cameras.len(),
@@ -155,7 +156,7 @@ impl Training {
     fn finite_view(&self) -> View {
         let (plan, workspace) = (self.trainer.plan(), self.trainer.workspace());
         let mut renderer =
-            Renderer::new(&self.gpu, plan, workspace, &self.bounds, false).expect("a renderer");
+            Renderer::new(&self.gpu, plan, workspace, &self.bounds, &plan.needs.lenses).expect("a renderer");
         let view = renderer.render(&self.camera).expect("a view");
         assert!(view.color.as_flattened().iter().chain(&view.depth).all(|value| value.is_finite()));
         view

@@ -1,6 +1,7 @@
 //! Training, resuming, measuring and rendering from end to end, on whatever adapter there is.
 
 use assert_cmd::Command;
+use nerf::camera::LensKind;
 use nerf::checkpoint::Checkpoint;
 use nerf::image::read_exr_channel;
 use nerf::kernels::training::STATE;
@@ -247,7 +248,8 @@ fn every_kind_of_scene_trains() {
         let result = train(&dataset, &run, &["--steps", "24"]);
         assert!(number(&result["psnr"]) > 4.0, "{scene}: {result}");
         let about = checkpoint(&run).about;
-        assert_eq!((about.needs.lens, about.needs.hdr), (scene == "courtyard", scene == "fog"));
+        let lens = if scene == "courtyard" { LensKind::OpenCv } else { LensKind::Pinhole };
+        assert_eq!((about.needs.lenses, about.needs.hdr), ([lens].into(), scene == "fog"));
         assert!(scene == "fog" || about.needs.cascades > 1);
         let cameras = dataset.join("transforms_test.json");
         let args = ["render", text(&run), "--out", text(&out), "--cameras", text(&cameras)];

@@ -12,7 +12,7 @@ mod report;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Parser, ValueEnum};
-use nerf::camera::{Camera, Lens};
+use nerf::camera::{Camera, LensKind};
 use nerf::config::Config;
 use nerf::dataset::{Dataset, OpenOptions};
 use nerf::gpu::timer::Timer;
@@ -310,7 +310,7 @@ fn trainer(gpu: &Arc<Gpu>, config: Config, dataset: &Dataset, images: &[Image]) 
     };
     let layout = Layout::new(&config, finest);
     let needs = Needs {
-        lens: cameras.iter().any(|camera| camera.lens != Lens::Pinhole),
+        lenses: LensKind::among(&cameras),
         alpha: images.iter().any(|image| image.has_alpha),
         hdr: dataset.is_hdr,
         cascades: dataset.bounds.cascades,

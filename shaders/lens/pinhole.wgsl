@@ -1,6 +1,5 @@
-// Provides: lens_undistort for a lens without distortion.
+// Provides: the ray of a lens without distortion.
 
-// xy: the ideal image-plane point; z: 1 where there is one.
-fn lens_undistort(distorted: vec2<f32>, radial: vec4<f32>, tangential: vec2<f32>) -> vec3<f32> {
-    return vec3(distorted, 1.0);
+fn pinhole_ray(camera: Camera, plane: vec2<f32>) -> LensRay {
+    return LensRay(vec2(0.0), vec3(plane.x, -plane.y, -1.0), true);
 }

@@ -1,6 +1,7 @@
 //! OpenCV's fisheye model, `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)`, on the branch around the axis where
 //! it grows, and up to the direction straight back.
 
+use super::branch::{first_root, surely_positive};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -18,16 +19,21 @@ pub(super) fn image(k: &[f64; 4], point: DVec3) -> Option<DVec2> {
     let theta = across.length().atan2(-point.z);
     // The direction straight back is a whole circle of the image.
     let around = across.try_normalize().unwrap_or(DVec2::X);
-    (surely_grows(k, theta) || theta <= rim(k)).then(|| radius(k, theta) * around)
+    is_within_rim(k, theta).then(|| radius(k, theta) * around)
 }
 
-/// The largest angle that the lens images, in radians: where the polynomial stops growing, at most π.
-pub(crate) fn rim(k: &[f64; 4]) -> f64 {
-    if surely_grows(k, PI) {
-        return PI;
-    }
-    let turns = roots(&[1.0, 3.0 * k[0], 5.0 * k[1], 7.0 * k[2], 9.0 * k[3]], PI * PI);
-    turns.first().map_or(PI, |square| square.sqrt())
+/// See [`super::Lens::rim`].
+pub(super) fn rim(k: &[f64; 4]) -> f64 {
+    first_root(&slope_of_square(k), PI * PI).map_or(PI, f64::sqrt)
+}
+
+fn is_within_rim(k: &[f64; 4], theta: f64) -> bool {
+    surely_positive(&slope_of_square(k), theta * theta) || theta <= rim(k)
+}
+
+/// The slope of θ_d, as a polynomial of θ².
+fn slope_of_square(k: &[f64; 4]) -> [f64; 5] {
+    [1.0, 3.0 * k[0], 5.0 * k[1], 7.0 * k[2], 9.0 * k[3]]
 }
 
 /// θ_d of the angle `theta`.
@@ -42,27 +48,11 @@ fn slope(k: &[f64; 4], theta: f64) -> f64 {
     1.0 + t2 * (3.0 * k[0] + t2 * (5.0 * k[1] + t2 * (7.0 * k[2] + t2 * 9.0 * k[3])))
 }
 
-/// A quick test that passes far from a rim: whether bounds of the derivative on pieces of `[0, theta]` are
-/// positive.
-fn surely_grows(k: &[f64; 4], theta: f64) -> bool {
-    const PIECES: u32 = 8;
-    let square = |piece: u32| theta * theta * f64::from(piece) / f64::from(PIECES);
-    (0..PIECES).all(|piece| {
-        let (low, high) = (square(piece), square(piece + 1));
-        let (mut least, mut low_power, mut high_power) = (1.0, 1.0, 1.0);
-        for (factor, k) in [3.0, 5.0, 7.0, 9.0].into_iter().zip(k) {
-            (low_power, high_power) = (low_power * low, high_power * high);
-            least += factor * k * if *k > 0.0 { low_power } else { high_power };
-        }
-        least > 0.0
-    })
-}
-
 /// The angle imaged at the distance `target` from the principal point; `None` beyond the rim.
 fn angle(k: &[f64; 4], target: f64) -> Option<f64> {
     let likely = solve(k, target, PI);
     let is_solution = |theta: f64| (radius(k, theta) - target).abs() <= 1e-14 * (1.0 + target);
-    if is_solution(likely) && surely_grows(k, likely) {
+    if is_solution(likely) && is_within_rim(k, likely) {
         return Some(likely);
     }
     let rim = rim(k);
@@ -92,39 +82,6 @@ fn solve(k: &[f64; 4], target: f64, high: f64) -> f64 {
     theta
 }
 
-/// Where the polynomial with these coefficients (constant first) changes its sign in `(0, end)`, in order.
-///
-/// Between two such places of its derivative a polynomial changes its sign at most once.
-fn roots(coefficients: &[f64], end: f64) -> Vec<f64> {
-    let value = |x: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
-    if coefficients.len() < 2 {
-        return Vec::new();
-    }
-    let derivative: Vec<f64> =
-        coefficients.iter().enumerate().skip(1).map(|(power, c)| power as f64 * c).collect();
-    let mut stops = vec![0.0];
-    stops.extend(roots(&derivative, end));
-    stops.push(end);
-    let changes = stops.windows(2).filter(|ends| (value(ends[0]) > 0.0) != (value(ends[1]) > 0.0));
-    changes.map(|ends| bisect(value, ends[0], ends[1])).collect()
-}
-
-/// Where `value` changes its sign between `a` and `b`: the last number on the side of `a`.
-fn bisect(value: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
-    let is_positive = value(a) > 0.0;
-    loop {
-        let middle = 0.5 * (a + b);
-        if middle <= a || middle >= b {
-            return a;
-        }
-        if (value(middle) > 0.0) == is_positive {
-            a = middle;
-        } else {
-            b = middle;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,12 +94,6 @@ mod tests {
         assert!((rim(&[-0.1, 0.0, 0.0, 0.0]) - (1.0f64 / 0.3).sqrt()).abs() < 1e-14);
         let quadratic = (0.75 - (0.75f64 * 0.75 - 0.4).sqrt()) / 0.2;
         assert!((rim(&[-0.25, 0.02, 0.0, 0.0]) - quadratic.sqrt()).abs() < 1e-13);
-        // (1 - u)² (1 + u / 4) = 1 - 1.75 u + 0.5 u² + 0.25 u³ touches zero: a little higher it has no root, a
-        // little lower two.
-        let near_touch = |lift: f64| roots(&[1.0 + lift, -1.75, 0.5, 0.25], 9.0);
-        assert_eq!(near_touch(1e-9), Vec::<f64>::new());
-        let [first, second] = near_touch(-1e-8)[..] else { panic!("two roots: {:?}", near_touch(-1e-8)) };
-        assert!(first < 1.0 && second > 1.0 && second - first < 3e-4);
     }
 
     #[test]

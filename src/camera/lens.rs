@@ -3,9 +3,10 @@
 //! Points of the image are given on the normalised image plane, `(pixel - center_px) / focal_px`, +x right
 //! and +y down. Points and directions of the camera are in its axes: +X right, +Y up, the view along -Z.
 
-use super::{equirectangular, fisheye, open_cv};
+use super::{Camera, equirectangular, fisheye, open_cv};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// How a camera maps directions to its image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -65,6 +66,12 @@ impl LensKind {
     pub const ALL: [Self; 5] =
         [Self::Pinhole, Self::OpenCv, Self::Fisheye, Self::Orthographic, Self::Equirectangular];
 
+    /// The models that `cameras` have.
+    #[must_use]
+    pub fn among<'a>(cameras: impl IntoIterator<Item = &'a Camera>) -> BTreeSet<Self> {
+        cameras.into_iter().map(|camera| camera.lens.kind()).collect()
+    }
+
     /// What the model is called.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -75,6 +82,13 @@ impl LensKind {
             Self::Orthographic => "orthographic",
             Self::Equirectangular => "equirectangular",
         }
+    }
+
+    /// What depth means behind such a lens, wherever a depth is given: the distance along the ray for a lens that
+    /// sees sideways and behind (fisheye, equirectangular), the distance along the view axis otherwise.
+    #[must_use]
+    pub const fn depth_is_distance(self) -> bool {
+        matches!(self, Self::Fisheye | Self::Equirectangular)
     }
 }
 
@@ -91,11 +105,22 @@ impl Lens {
         }
     }
 
-    /// What depth means behind this lens, wherever a depth is given: the distance along the ray for a lens
-    /// that sees sideways and behind (fisheye, equirectangular), the distance along the view axis otherwise.
+    /// As [`LensKind::depth_is_distance`].
     #[must_use]
     pub const fn depth_is_distance(&self) -> bool {
-        matches!(self, Self::Fisheye { .. } | Self::Equirectangular)
+        self.kind().depth_is_distance()
+    }
+
+    /// Where the polynomial of a lens stops growing, beyond which nothing is imaged: for a fisheye the angle to the
+    /// view axis in radians, at most π; for OpenCV's model the largest undistorted distance from the principal point
+    /// (with tangential terms, in the direction where it is smallest). `None` for other lenses.
+    #[must_use]
+    pub fn rim(&self) -> Option<f64> {
+        match self {
+            Self::OpenCv { k, p } => Some(open_cv::rim(k, p)),
+            Self::Fisheye { k } => Some(fisheye::rim(k)),
+            Self::Pinhole | Self::Orthographic | Self::Equirectangular => None,
+        }
     }
 
     /// The ray that is imaged at `plane`, or `None` where the lens images none.

@@ -1,13 +1,32 @@
 //! OpenCV's radial-tangential model on the normalised image plane, y down, and its inverse.
 
+use super::branch::{first_root, surely_positive};
 use glam::{DMat2, DVec2};
+
+/// Tangent beyond which a fold does not matter: that of 89.9 degrees.
+const FARTHEST: f64 = 573.0;
 
 /// Where the ideal point is imaged; `None` where the model folds over: a polynomial brings points far outside
 /// the field of view back into the image.
 pub(super) fn image(k: &[f64; 4], p: &[f64; 2], ideal: DVec2) -> Option<DVec2> {
-    let distorted = distort(k, p, ideal);
-    let back = undistort(k, p, distorted)?;
-    (back.distance(ideal) <= 1e-6 * (1.0 + ideal.length())).then_some(distorted)
+    is_within_rim(k, p, ideal).then(|| distort(k, p, ideal))
+}
+
+/// See [`super::Lens::rim`].
+pub(super) fn rim(k: &[f64; 4], p: &[f64; 2]) -> f64 {
+    first_root(&least_slope(k, p), FARTHEST).unwrap_or(FARTHEST)
+}
+
+fn is_within_rim(k: &[f64; 4], p: &[f64; 2], ideal: DVec2) -> bool {
+    let radius = ideal.length();
+    surely_positive(&least_slope(k, p), radius) || radius <= rim(k, p)
+}
+
+/// How fast the image moves outwards with r, as a polynomial of r, in the direction where it does so least: there the
+/// tangential terms take `6 |p| r` from the radial slope.
+fn least_slope(k: &[f64; 4], p: &[f64; 2]) -> [f64; 9] {
+    let tangential = 6.0 * p[0].hypot(p[1]);
+    [1.0, -tangential, 3.0 * k[0], 0.0, 5.0 * k[1], 0.0, 7.0 * k[2], 0.0, 9.0 * k[3]]
 }
 
 /// From the ideal to the distorted point.
@@ -68,7 +87,8 @@ fn newton(k: &[f64; 4], p: &[f64; 2], start: DVec2, [origin, target]: [DVec2; 2]
         }
         let size = step.length();
         if size <= 4e-16 * (1.0 + ideal.length()) || (size >= last_step && size < 1e-13) {
-            return Some(ideal);
+            // Beyond the rim there may be a branch on which the Jacobian is positive again.
+            return is_within_rim(k, p, ideal).then_some(ideal);
         }
         last_step = size;
     }
@@ -99,6 +119,10 @@ mod tests {
         assert!(undistort(0.608).is_some());
         assert_eq!(undistort(0.609), None);
         assert_eq!(undistort(f64::NAN), None);
+        // This one folds at 0.454 and grows again from 0.449 on, for ever.
+        let unfolds = |x: f64| super::undistort(&[-0.9, 0.35, 0.0, 0.0], &[0.0; 2], DVec2::new(0.0, x));
+        assert!(unfolds(0.452).is_some_and(|ideal| ideal.y < 0.79));
+        assert!([0.46, 0.6, 1.0, 2.0, 9.0].into_iter().all(|x| unfolds(x).is_none()));
         assert_eq!(image(&[-0.4, 0.0, 0.0, 0.0], &[0.0; 2], DVec2::new(1.3, 0.0)), None);
     }
 

@@ -1,6 +1,7 @@
 //! Functions of the kernels on their own, in a kernel that only evaluates them.
 
 use super::{Setup, Subject};
+use crate::camera::LensKind;
 use crate::gpu::pass::Stage;
 use crate::kernels::{Part, Workspace};
 use anyhow::Result;
@@ -21,7 +22,9 @@ impl Probe<'_> {
         inputs: &[[[f32; 4]; INPUTS]],
     ) -> Result<Vec<[[f32; 4]; OUTPUTS]>> {
         let gpu = &subject.gpu;
-        let plan = subject.setup(Setup::tiny()).plan(gpu)?;
+        let mut setup = Setup::tiny();
+        setup.needs.lenses = LensKind::ALL.into();
+        let plan = subject.setup(setup).plan(gpu)?;
         let cases = inputs.len();
         let text = format!(
             "var<storage, read> probe_inputs: array<vec4<f32>>;\n\

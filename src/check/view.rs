@@ -3,9 +3,10 @@
 use super::draw::Random;
 use super::marching::reference;
 use super::{Setup, Subject, Tally, Workbench};
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, Lens, LensKind};
 use crate::dataset::Bounds;
 use crate::reference::composite::{mean_depth, opacity, optical_depth, transmittances};
+use crate::reference::lens;
 use crate::reference::march::BoxRay;
 use crate::render::Renderer;
 use anyhow::Result;
@@ -16,7 +17,8 @@ const STOP: f64 = 1e-6;
 /// Size of the view.
 const SIZE: (u32, u32) = (11, 9);
 
-/// Colour, opacity and depth of every pixel: of a bounded scene, and of one with cascades, linear light and a lens.
+/// Colour, opacity and depth of every pixel, through every lens: of bounded scenes and of some with cascades, in sRGB
+/// and linear light.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
@@ -27,7 +29,15 @@ pub fn rendered_views(subject: &Subject) -> Result<Tally> {
         "sums of the networks round; a ray ends at a transmittance of 1e-6",
     );
     let lens = Lens::OpenCv { k: [-0.1, 0.02, 0.0, 0.0], p: [1e-3, -1e-3] };
-    for (cascades, hdr, lens) in [(1, false, Lens::Pinhole), (3, true, lens)] {
+    let fisheye = Lens::Fisheye { k: [-0.05, 0.01, 0.0, 0.0] };
+    let scenes = [
+        (1, false, Lens::Pinhole),
+        (3, true, lens),
+        (1, true, fisheye),
+        (3, false, Lens::Orthographic),
+        (1, false, Lens::Equirectangular),
+    ];
+    for (cascades, hdr, lens) in scenes {
         let mut setup = Setup::tiny().network(32, 2).hdr(hdr);
         setup.needs.cascades = cascades;
         setup.config.selection.stop_transmittance = STOP;
@@ -47,7 +57,12 @@ fn camera(bounds: &Bounds, lens: Lens) -> Camera {
     Camera {
         width: SIZE.0,
         height: SIZE.1,
-        focal_px: DVec2::splat(13.0),
+        focal_px: DVec2::splat(match lens.kind() {
+            LensKind::Pinhole | LensKind::OpenCv => 13.0,
+            LensKind::Fisheye => 5.0,
+            LensKind::Orthographic => 4.0 / bounds.outer_half(),
+            LensKind::Equirectangular => 3.0,
+        }),
         center_px: DVec2::new(5.0, 4.0),
         lens,
         world_from_camera: DAffine3::from_mat3_translation(
@@ -58,9 +73,10 @@ fn camera(bounds: &Bounds, lens: Lens) -> Camera {
 }
 
 fn compare(tally: &mut Tally, bench: &Workbench, bounds: &Bounds, camera: &Camera) -> Result<()> {
-    let linked = camera.lens != Lens::Pinhole;
-    let view = Renderer::new(&bench.gpu, &bench.plan, &bench.workspace, bounds, linked)?.render(camera)?;
-    let case = format!("{} cascades", bounds.cascades);
+    // With cascades the lens is chosen among all, without it is the only one.
+    let lenses = if bounds.cascades > 1 { LensKind::ALL.into() } else { LensKind::among([camera]) };
+    let view = Renderer::new(&bench.gpu, &bench.plan, &bench.workspace, bounds, &lenses)?.render(camera)?;
+    let case = format!("{} cascades, {:?}", bounds.cascades, camera.lens);
     let (colors, depths) = expected(bench, bounds, camera)?;
     tally.holds((view.width, view.height) == SIZE, || format!("{case}: size"));
     tally.each(&format!("{case}, colour"), view.color.as_flattened(), &colors, |i| 1.0 + colors[i].abs());
@@ -78,7 +94,11 @@ fn expected(bench: &Workbench, bounds: &Bounds, camera: &Camera) -> Result<(Vec<
     let (mut colors, mut depths) = (Vec::new(), Vec::new());
     for index in 0..SIZE.0 * SIZE.1 {
         let pixel = DVec2::new(f64::from(index % SIZE.0) + 0.5, f64::from(index / SIZE.0) + 0.5);
-        let Some(ray) = camera.ray(pixel) else { continue };
+        let Some(ray) = camera.ray(pixel) else {
+            colors.extend([0.0; 4]);
+            depths.push(0.0);
+            continue;
+        };
         let in_box = BoxRay { origin: (ray.origin - bounds.min()) / side, direction: ray.direction };
         let (mut taus, mut values, mut z) = (Vec::new(), Vec::new(), Vec::new());
         for sample in march.samples(in_box, 0.5, &words) {
@@ -88,7 +108,8 @@ fn expected(bench: &Workbench, bounds: &Bounds, camera: &Camera) -> Result<(Vec<
             let (s, color) = model.query(objective.color_range, sample.position, ray.direction);
             taus.push(optical_depth(s, sample.delta));
             values.push(color);
-            z.push((sample.position - in_box.origin).dot(camera.forward()) * side);
+            let seen = sample.position * side + bounds.min() - camera.position();
+            z.push(lens::depth(&camera.lens, camera.world_from_camera.matrix3.transpose() * seen));
         }
         let weights: Vec<f64> = (transmittances(objective.transmittance, &taus).iter().zip(&taus))
             .map(|(t, &tau)| t * opacity(tau))

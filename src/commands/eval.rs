@@ -5,7 +5,7 @@ use super::scores::{Compared, Judge, Means, Score};
 use super::{Session, find_frames, writable_folder};
 use crate::cli::Eval;
 use anyhow::{Context, Result, ensure};
-use nerf::camera::Lens;
+use nerf::camera::LensKind;
 use nerf::dataset::{Dataset, OpenOptions, Split};
 use nerf::image::write_png_rgba8;
 use nerf::picture::{ColorSpace, opaque_srgb8};
@@ -26,9 +26,9 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
         writable_folder(folder)?;
     }
     let gpu = session.open_gpu()?;
-    let lens = indices.iter().any(|&index| dataset.frames[index].camera.lens != Lens::Pinhole);
+    let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
     let judge = Judge {
-        renderer: field.renderer(&gpu, lens)?,
+        renderer: field.renderer(&gpu, &lenses)?,
         color_space: field.color_space(),
         background: args.background.color(),
         dataset: &dataset,

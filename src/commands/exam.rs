@@ -45,7 +45,7 @@ impl<'a> Exam<'a> {
             return Ok(None);
         }
         let needs = &setup.about.needs;
-        let renderer = Renderer::new(gpu, &setup.plan, workspace, &setup.about.bounds, needs.lens)?;
+        let renderer = Renderer::new(gpu, &setup.plan, workspace, &setup.about.bounds, &needs.lenses)?;
         let color_space = ColorSpace::of(needs.hdr);
         let judge = Judge { renderer, color_space, background: [0.0; 3], dataset };
         let count = setup.test.len().min(few);

@@ -2,11 +2,13 @@
 
 use super::Session;
 use anyhow::Result;
+use nerf::camera::LensKind;
 use nerf::checkpoint::{self, About, Checkpoint};
 use nerf::gpu::Gpu;
 use nerf::kernels::{Plan, Workspace, density, training};
 use nerf::picture::ColorSpace;
 use nerf::render::{PARAMETERS, Renderer};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -44,8 +46,8 @@ impl Field {
         ColorSpace::of(self.about.needs.hdr)
     }
 
-    /// A renderer of the field; `lens` for cameras with distortion.
-    pub(super) fn renderer(&self, gpu: &Arc<Gpu>, lens: bool) -> Result<Renderer> {
+    /// A renderer of the field for cameras with `lenses`.
+    pub(super) fn renderer(&self, gpu: &Arc<Gpu>, lenses: &BTreeSet<LensKind>) -> Result<Renderer> {
         let About { config, needs, bounds, .. } = &self.about;
         let plan = Plan::new(gpu, config.clone(), self.about.layout(), needs.clone());
         let mut workspace = Workspace::default();
@@ -54,6 +56,6 @@ impl Field {
             workspace.write(gpu, name, values);
         }
         workspace.write(gpu, "occupancy_bits", &self.occupancy_bits);
-        Renderer::new(gpu, &plan, &workspace, bounds, lens)
+        Renderer::new(gpu, &plan, &workspace, bounds, lenses)
     }
 }

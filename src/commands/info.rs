@@ -36,7 +36,7 @@ struct Report<'a> {
     /// `None` where there is nothing to train on.
     memory: Option<Estimate>,
     /// The parts of the program that stay out.
-    left_out: Vec<&'static str>,
+    left_out: Vec<String>,
     /// Worst first.
     problems: Vec<Finding>,
 }

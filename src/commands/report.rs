@@ -6,7 +6,7 @@ use super::{Session, find_frames};
 use crate::cli::Report as Args;
 use crate::remarks::Remarks;
 use anyhow::{Context, Result, ensure};
-use nerf::camera::Lens;
+use nerf::camera::LensKind;
 use nerf::checkpoint::{self, About};
 use nerf::dataset::{Dataset, OpenOptions};
 use nerf::file::write_atomically;
@@ -136,9 +136,9 @@ fn views(args: &Args, field: &Field, session: &Session<'_>) -> Result<Result<Tes
         Err(error) => return Err(error),
     };
     let gpu = session.open_gpu()?;
-    let lens = indices.iter().any(|&index| dataset.frames[index].camera.lens != Lens::Pinhole);
+    let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
     let mut judge = Judge {
-        renderer: field.renderer(&gpu, lens)?,
+        renderer: field.renderer(&gpu, &lenses)?,
         color_space: field.color_space(),
         background: [0.0; 3],
         dataset: &dataset,

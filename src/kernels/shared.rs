@@ -1,5 +1,6 @@
 //! The structs that kernels and the host share.
 
+use super::lens;
 use crate::camera::Lens;
 use crate::config::Optimizer;
 use crate::dataset::Bounds;
@@ -92,7 +93,7 @@ gpu_struct! {
         back: [f32; 3],
         /// Pixels that can be drawn.
         pixel_count: u32,
-        /// Focal lengths.
+        /// Focal lengths in pixels, per radian or per box unit.
         focal_px: [f32; 2],
         /// Principal point.
         center_px: [f32; 2],
@@ -100,8 +101,10 @@ gpu_struct! {
         radial: [f32; 4],
         /// p1, p2.
         tangential: [f32; 2],
-        /// Padding.
-        unused_2: [f32; 2],
+        /// Which lens.
+        lens: u32,
+        /// Where the lens's polynomial stops growing.
+        rim: f32,
     }
 }
 
@@ -117,6 +120,11 @@ impl Camera {
             Lens::Fisheye { k } => (k, [0.0; 2]),
             Lens::Pinhole | Lens::Orthographic | Lens::Equirectangular => ([0.0; 4], [0.0; 2]),
         };
+        // A parallel projection has pixels per length, and lengths are those of the box.
+        let focal_px = match camera.lens {
+            Lens::Orthographic => camera.focal_px * side,
+            _ => camera.focal_px,
+        };
         Self {
             origin: ((pose.translation - bounds.min()) / side).as_vec3().to_array(),
             width: camera.width,
@@ -126,10 +134,12 @@ impl Camera {
             first_row: 0,
             pixel_count: 1,
             back: axis(pose.matrix3.z_axis),
-            focal_px: camera.focal_px.as_vec2().to_array(),
+            focal_px: focal_px.as_vec2().to_array(),
             center_px: camera.center_px.as_vec2().to_array(),
             radial: radial.map(|k| k as f32),
             tangential: tangential.map(|p| p as f32),
+            lens: lens::number(camera.lens.kind()),
+            rim: camera.lens.rim().unwrap_or_default() as f32,
             ..Self::default()
         }
     }

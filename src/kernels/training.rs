@@ -78,7 +78,6 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
         RAY,
         RAY_STORE,
         CAMERA,
-        plan.lens(),
         plan.pixels(),
         plan.position(),
         plan.depth_target(),

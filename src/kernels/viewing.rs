@@ -22,7 +22,7 @@ pub fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [STEP, COUNTERS, RAY, RAY_STORE, CAMERA, plan.lens(), part!("view_rays.wgsl")];
+    let parts = [STEP, COUNTERS, RAY, RAY_STORE, CAMERA, part!("view_rays.wgsl")];
     let kernel = plan.kernel(gpu, "view rays", &parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }
@@ -32,8 +32,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts =
-        [COUNTERS, RAY, CAMERA, plan.lens(), EXP, SUM, plan.transmittance(), part!("view_composite.wgsl")];
+    let parts = [COUNTERS, RAY, CAMERA, EXP, SUM, plan.transmittance(), part!("view_composite.wgsl")];
     let kernel = plan.kernel(gpu, "view composite", &parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }

@@ -1,124 +1,162 @@
-//! OpenCV's radial-tangential lens on the normalised image plane, y pointing down, and its inverse.
+//! Lenses: the ray that is imaged at a point, and the point where a direction is imaged.
 //!
-//! ```text
-//! x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸) + 2 p1 x y + p2 (r² + 2 x²)
-//! y_d = y (1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸) + p1 (r² + 2 y²) + 2 p2 x y
-//! ```
+//! Points of the image are on the normalised image plane, `(pixel - center_px) / focal_px`, +x right and +y down;
+//! the camera's axes are +X right, +Y up, the view along -Z. What the models mean is said at [`Lens`].
 
-use glam::{DMat2, DVec2};
+mod fisheye;
+mod open_cv;
 
-/// Residual, relative to `max(1, |distorted|)`, at which the inverse is found.
-pub const TOLERANCE: f64 = 1e-14;
-const MAX_ITERATIONS: u32 = 100;
-const MAX_HALVINGS: u32 = 40;
+pub use fisheye::Fisheye;
+pub use open_cv::{Distortion, TOLERANCE};
 
-/// Coefficients of the lens.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Distortion {
-    /// Radial coefficients k1..k4.
-    pub k: [f64; 4],
-    /// Tangential coefficients p1, p2.
-    pub p: [f64; 2],
+use crate::camera::Lens;
+use glam::{DMat3, DVec2, DVec3};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// A ray in the camera's axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensRay {
+    /// Where it starts.
+    pub start: DVec3,
+    /// Unit direction.
+    pub direction: DVec3,
 }
 
-impl Distortion {
-    /// Where the lens images the undistorted point `point`.
-    pub fn distort(&self, point: DVec2) -> DVec2 {
-        let DVec2 { x, y } = point;
-        let [p1, p2] = self.p;
-        let rr = x * x + y * y;
-        let radial = self.radial(rr);
-        DVec2::new(
-            x * radial + 2.0 * p1 * x * y + p2 * (rr + 2.0 * x * x),
-            y * radial + p1 * (rr + 2.0 * y * y) + 2.0 * p2 * x * y,
-        )
-    }
-
-    /// ∂distorted/∂point, column by column.
-    pub fn jacobian(&self, point: DVec2) -> DMat2 {
-        let DVec2 { x, y } = point;
-        let [k1, k2, k3, k4] = self.k;
-        let [p1, p2] = self.p;
-        let rr = x * x + y * y;
-        let radial = self.radial(rr);
-        let d_radial = k1 + rr * (2.0 * k2 + rr * (3.0 * k3 + rr * 4.0 * k4));
-        let mixed = 2.0 * x * y * d_radial + 2.0 * p1 * x + 2.0 * p2 * y;
-        let dx_dx = radial + 2.0 * x * x * d_radial + 2.0 * p1 * y + 6.0 * p2 * x;
-        let dy_dy = radial + 2.0 * y * y * d_radial + 6.0 * p1 * y + 2.0 * p2 * x;
-        DMat2::from_cols(DVec2::new(dx_dx, mixed), DVec2::new(mixed, dy_dy))
-    }
-
-    /// The point that the lens images at `distorted`, by Newton's method from the centre.
-    ///
-    /// A step is halved until it reduces the residual and stays where the lens does not fold the plane over
-    /// (a positive Jacobian). `None` if that does not lead to a solution: no point is imaged there.
-    pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
-        let tolerance = TOLERANCE * distorted.length().max(1.0);
-        let mut point = DVec2::ZERO;
-        let mut residual = self.distort(point) - distorted;
-        for _ in 0..MAX_ITERATIONS {
-            if residual.length() <= tolerance {
-                return Some(point);
-            }
-            let mut step = self.jacobian(point).inverse() * residual;
-            let mut halvings = 0;
-            loop {
-                let next = point - step;
-                let next_residual = self.distort(next) - distorted;
-                let better = next_residual.length() < residual.length();
-                if better && self.jacobian(next).determinant() > 0.0 {
-                    (point, residual) = (next, next_residual);
-                    break;
-                }
-                if halvings == MAX_HALVINGS {
-                    return None;
-                }
-                step *= 0.5;
-                halvings += 1;
-            }
+/// The ray that is imaged at `plane`; `None` if there is none.
+pub fn ray(lens: &Lens, plane: DVec2) -> Option<LensRay> {
+    let through = |x: f64, y: f64| DVec3::new(x, -y, -1.0).normalize();
+    let (start, direction) = match *lens {
+        Lens::Pinhole => (DVec3::ZERO, through(plane.x, plane.y)),
+        Lens::OpenCv { k, p } => {
+            let ideal = Distortion { k, p }.undistort(plane)?;
+            (DVec3::ZERO, through(ideal.x, ideal.y))
         }
-        None
-    }
+        Lens::Fisheye { k } => {
+            // The view axis turned to the right by θ, then around itself.
+            let theta = Fisheye { k }.angle(plane.length())?;
+            let around = DMat3::from_rotation_z(-plane.y.atan2(plane.x));
+            (DVec3::ZERO, around * DMat3::from_rotation_y(-theta) * DVec3::NEG_Z)
+        }
+        Lens::Orthographic => (DVec3::new(plane.x, -plane.y, 0.0), DVec3::NEG_Z),
+        Lens::Equirectangular => {
+            if !(plane.x.abs() <= PI && plane.y.abs() <= FRAC_PI_2) {
+                return None;
+            }
+            // The view axis turned up by the latitude, then to the right by the longitude.
+            let turn = DMat3::from_rotation_y(-plane.x) * DMat3::from_rotation_x(-plane.y);
+            (DVec3::ZERO, turn * DVec3::NEG_Z)
+        }
+    };
+    Some(LensRay { start, direction })
+}
 
-    /// `1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸`, given `r²`.
-    fn radial(&self, rr: f64) -> f64 {
-        let [k1, k2, k3, k4] = self.k;
-        1.0 + rr * (k1 + rr * (k2 + rr * (k3 + rr * k4)))
+/// Where a point of the camera's axes is imaged by a lens that sees it.
+pub fn image(lens: &Lens, point: DVec3) -> DVec2 {
+    let DVec3 { x: right, y: up, z: back } = point;
+    let ideal = DVec2::new(right, -up) / -back;
+    match *lens {
+        Lens::Pinhole => ideal,
+        Lens::OpenCv { k, p } => Distortion { k, p }.distort(ideal),
+        Lens::Fisheye { k } => {
+            let radius = Fisheye { k }.radius(angle(point, DVec3::NEG_Z));
+            radius * DVec2::new(right, -up).normalize_or_zero()
+        }
+        Lens::Orthographic => DVec2::new(right, -up),
+        Lens::Equirectangular => DVec2::new(right.atan2(-back), angle(point, DVec3::Y) - FRAC_PI_2),
+    }
+}
+
+/// Where `is_below` turns from true to false, up to rounding.
+fn bisect(mut low: f64, mut high: f64, is_below: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        if is_below(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// The angle between a vector and a unit vector, as precise near 0 and π as anywhere (Kahan 2006).
+fn angle(vector: DVec3, unit: DVec3) -> f64 {
+    let vector = vector.normalize();
+    2.0 * (vector - unit).length().atan2((vector + unit).length())
+}
+
+/// The depth of a point: along the ray for lenses that see sideways and behind, along the view axis for others.
+pub fn depth(lens: &Lens, point: DVec3) -> f64 {
+    match lens {
+        Lens::Fisheye { .. } | Lens::Equirectangular => point.length(),
+        Lens::Pinhole | Lens::OpenCv { .. } | Lens::Orthographic => -point.z,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Camera;
+    use glam::{DAffine3, DQuat};
 
-    const LENS: Distortion = Distortion { k: [-0.28, 0.07, -0.004, 0.001], p: [0.002, -0.001] };
-
+    /// The product's cameras do the same by other methods.
     #[test]
-    fn distortion_by_hand() {
-        let lens = Distortion { k: [0.1, 0.01, 0.001, 0.0001], p: [0.01, 0.02] };
-        // r² = 5, radial = 1 + 0.5 + 0.25 + 0.125 + 0.0625 = 1.9375.
-        let distorted = lens.distort(DVec2::new(1.0, 2.0));
-        assert!((distorted.x - (1.9375 + 0.04 + 0.02 * 7.0)).abs() < 1e-12);
-        assert!((distorted.y - (3.875 + 0.01 * 13.0 + 0.08)).abs() < 1e-12);
-    }
-
-    #[test]
-    fn undistort_inverts() {
-        for i in -8..=8 {
-            for j in -8..=8 {
-                let point = DVec2::new(f64::from(i), f64::from(j)) * 0.1;
-                let found = LENS.undistort(LENS.distort(point)).expect("within the lens");
-                assert!((found - point).length() < 1e-12, "{point} {found}");
+    fn cameras_agree() {
+        let lenses = [
+            Lens::Pinhole,
+            Lens::OpenCv { k: [-0.28, 0.07, -0.004, 0.001], p: [0.002, -0.001] },
+            Lens::OpenCv { k: [0.48, 0.9, 0.3, 0.1], p: [0.02, -0.01] },
+            // Folds at 0.454 and unfolds at 0.449.
+            Lens::OpenCv { k: [-0.9, 0.35, 0.0, 0.0], p: [5e-3, -8e-3] },
+            Lens::Fisheye { k: [0.0; 4] },
+            Lens::Fisheye { k: [-0.25, 0.02, 0.0, 0.0] },
+            Lens::Fisheye { k: [-0.04, 0.01, -0.003, 0.0002] },
+            Lens::Fisheye { k: [0.5, 0.3, 0.1, 0.05] },
+            Lens::Orthographic,
+            Lens::Equirectangular,
+        ];
+        for lens in lenses {
+            let camera = Camera {
+                width: 160,
+                height: 120,
+                focal_px: DVec2::new(40.0, 38.0),
+                center_px: DVec2::new(75.0, 64.0),
+                lens,
+                world_from_camera: DAffine3::from_rotation_translation(
+                    DQuat::from_rotation_x(0.4) * DQuat::from_rotation_y(2.0),
+                    DVec3::new(1.0, 2.0, 3.0),
+                ),
+            };
+            let mut with_rays = 0;
+            for index in (0..160 * 120).step_by(7) {
+                let pixel = DVec2::new(f64::from(index % 160) + 0.5, f64::from(index / 160) + 0.5);
+                let (want, got) =
+                    (ray(&lens, (pixel - camera.center_px) / camera.focal_px), camera.ray(pixel));
+                assert_eq!(want.is_some(), got.is_some(), "{lens:?} {pixel}");
+                let (Some(want), Some(got)) = (want, got) else { continue };
+                with_rays += 1;
+                let pose = camera.world_from_camera;
+                let direction = pose.transform_vector3(want.direction);
+                assert!(direction.distance(got.direction) < 1e-6, "{lens:?} {pixel}");
+                assert!(pose.transform_point3(want.start).distance(got.origin) < 1e-12);
+                let point = want.start + 3.0 * want.direction;
+                let (back, along) = camera.project(pose.transform_point3(point)).expect("in view");
+                let again = image(&lens, point) * camera.focal_px + camera.center_px;
+                assert!(
+                    back.distance(again) < 1e-6 && again.distance(pixel) < 1e-6,
+                    "{lens:?} {pixel} {again}"
+                );
+                assert!((along - depth(&lens, point)).abs() < 1e-12);
             }
+            assert!(with_rays > 100, "{lens:?}: {with_rays}");
         }
     }
 
     #[test]
-    fn beyond_the_fold_there_is_nothing() {
-        let barrel = Distortion { k: [-0.3, 0.0, 0.0, 0.0], p: [0.0; 2] };
-        // r (1 − 0.3 r²) is at most 0.7027, at r = 1.054.
-        assert!(barrel.undistort(DVec2::new(0.70, 0.0)).is_some());
-        assert!(barrel.undistort(DVec2::new(0.71, 0.0)).is_none());
-        assert!(barrel.undistort(DVec2::new(f64::NAN, 0.0)).is_none());
+    fn nothing_is_seen_off_the_sphere() {
+        assert_eq!(ray(&Lens::Equirectangular, DVec2::new(3.2, 0.0)), None);
+        assert_eq!(ray(&Lens::Equirectangular, DVec2::new(0.0, -1.6)), None);
+        assert_eq!(ray(&Lens::Equirectangular, DVec2::NAN), None);
+        assert_eq!(ray(&Lens::Fisheye { k: [0.0; 4] }, DVec2::new(0.0, 3.2)), None);
     }
 }

@@ -5,7 +5,7 @@ use anyhow::Result;
 use nerf::check::networks::{SHAPES, Shape, networks};
 use nerf::check::{
     Forced, activation, adam, exponential, fused, grid, harmonics, lens, loss, marching, occupancy, random,
-    rays, selection, step, targets, view,
+    rays, selection, step, view,
 };
 use nerf::config::Accumulation;
 use nerf::gpu::tensor::Memory;
@@ -26,8 +26,8 @@ fn random_numbers() -> Result<()> {
 }
 
 #[test]
-fn lens_model() -> Result<()> {
-    passes([lens::lens_model(&subject()?)?]);
+fn lens_models() -> Result<()> {
+    passes(lens::lens_models(&subject()?)?);
     Ok(())
 }
 
@@ -38,8 +38,14 @@ fn view_rays() -> Result<()> {
 }
 
 #[test]
+fn sharp_rays() -> Result<()> {
+    passes(rays::sharp_rays(&subject()?)?);
+    Ok(())
+}
+
+#[test]
 fn training_rays() -> Result<()> {
-    passes([targets::training_rays(&subject()?)?]);
+    passes([rays::training_rays(&subject()?)?]);
     Ok(())
 }
 
@@ -180,7 +186,7 @@ fn tensors_in_buffers() -> Result<()> {
     passes(fused::fused(&subject)?);
     passes(adam::adam(&subject)?);
     passes([occupancy::occupancy_update(&subject)?, view::rendered_views(&subject)?]);
-    passes([targets::training_rays(&subject)?, loss::depth_and_relative_errors(&subject)?]);
+    passes([rays::training_rays(&subject)?, loss::depth_and_relative_errors(&subject)?]);
     let setups = step::setups();
     passes([step::one_step(&subject, &[setups[0].clone(), setups[4].clone()])?]);
     Ok(())

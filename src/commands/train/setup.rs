@@ -119,7 +119,7 @@ impl Setup {
     }
 
     /// The parts that the scene does not need.
-    pub(in crate::commands) fn left_out(&self, dataset: &Dataset) -> Vec<&'static str> {
+    pub(in crate::commands) fn left_out(&self, dataset: &Dataset) -> Vec<String> {
         needs::left_out(&self.plan.needs, self.about.config.background, dataset)
     }
 }

@@ -1,22 +1,39 @@
 //! The rays that a training draws: from which pixel of which photo, and what they should look like.
 
-use super::draw::{Random, uniform};
-use super::rays::{DeviceRay, LENSES, bounds, camera, drawn, is_close_to_a_fold};
-use super::{Setup, Subject, Tally, Workbench};
-use crate::camera::Camera;
+use super::{DeviceRay, bounds, camera, is_close_to_a_fold};
+use crate::camera::{Camera, Lens};
+use crate::check::draw::{Random, SEED, STEP, uniform};
+use crate::check::{Setup, Subject, Tally, Workbench};
 use crate::config::Background;
 use crate::dataset::Photo;
 use crate::gpu::banks::ROW;
 use crate::image::{Image, Pixels};
 use crate::kernels::photos::Units;
 use crate::kernels::{self, Needs, dimension, training};
+use crate::reference::random::random_u32;
 use anyhow::Result;
 use glam::DVec2;
 
 /// Photos smaller than a row of the banks, and one that lies in several banks.
 const SIZES: [(u32, u32); 5] = [(5, 3), (4, 4), (1, 1), (70, 131), (2, 31)];
+/// A rig that mixes lenses.
+const LENSES: [Lens; 5] = [
+    Lens::OpenCv { k: [-0.27, 0.11, -0.03, 0.004], p: [2e-3, 1e-3] },
+    Lens::Fisheye { k: [-0.03, 0.004, -0.0008, 0.00002] },
+    Lens::Orthographic,
+    Lens::Pinhole,
+    Lens::Equirectangular,
+];
 /// What colours and depths are multiplied with on their way to the device.
 const UNITS: Units = Units { color: 0.25, depth: 0.5 };
+
+/// Which view and which of its pixels, of which each has so many, the kernel draws for a ray.
+#[must_use]
+pub fn drawn(ray: usize, pixels: &[u32]) -> (usize, u32) {
+    let draw = |dimension| random_u32(SEED, STEP, ray as u32, dimension);
+    let view = draw(dimension::IMAGE) as usize % pixels.len();
+    (view, draw(dimension::PIXEL) % pixels[view])
+}
 
 /// Photos of a batch, as they went to the device.
 struct Photos {
@@ -44,7 +61,8 @@ pub fn training_rays(subject: &Subject) -> Result<Tally> {
     for (background, needs) in kinds {
         let mut setup = Setup::tiny();
         setup.config.background = background;
-        setup.needs = Needs { lens: true, cameras: SIZES.len(), ..needs };
+        let lenses = LENSES.iter().map(Lens::kind).collect();
+        setup.needs = Needs { lenses, cameras: SIZES.len(), ..needs };
         let mut bench = subject.workbench(setup)?;
         let photos = Photos::upload(&mut bench, &mut Random::new(41))?;
         let stage = training::rays(&bench.gpu, &bench.plan, &bench.workspace)?;
@@ -60,7 +78,8 @@ pub fn training_rays(subject: &Subject) -> Result<Tally> {
 
 impl Photos {
     fn upload(bench: &mut Workbench, random: &mut Random) -> Result<Self> {
-        let cameras = SIZES.map(|size| camera(random, size, LENSES[3].1)).to_vec();
+        let cameras: Vec<_> =
+            SIZES.iter().zip(LENSES).map(|(&size, lens)| camera(random, size, lens)).collect();
         let needs = bench.plan.needs.clone();
         let photos: Vec<_> = SIZES.iter().map(|&size| photo(random, size, &needs)).collect();
         let record = bench.plan.record();
@@ -100,7 +119,11 @@ impl Photos {
                 tally.each(&case, &ray.direction.to_array(), &want.direction.to_array(), |_| 1.0);
                 if needs.depth {
                     let depth = f64::from(photo.depth[texel as usize] * UNITS.depth);
-                    let distance = depth / want.direction.dot(camera.forward());
+                    let along = match camera.lens.kind().depth_is_distance() {
+                        true => 1.0,
+                        false => want.direction.dot(camera.forward()),
+                    };
+                    let distance = depth / along;
                     tally.value(depths[index].into(), distance, 1.0 + distance, || format!("{case}, depth"));
                 }
             }
