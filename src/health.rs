@@ -21,6 +21,7 @@ use crate::camera::Camera;
 use crate::dataset::Dataset;
 use crate::dataset::focus::{Axis, Focus, find};
 use glam::DVec3;
+use photos::Gallery;
 use std::collections::HashSet;
 
 /// What the cameras of a dataset tell.
@@ -34,6 +35,8 @@ pub struct Survey {
     pub coverage: Coverage,
     /// Focal lengths, sizes and lenses.
     pub optics: Optics,
+    /// Pairs of frames with different images and the same pose.
+    pub same_pose: Vec<[usize; 2]>,
     /// What looks wrong, worst first.
     pub findings: Vec<Finding>,
 }
@@ -55,10 +58,24 @@ impl Survey {
             findings.extend(coverage.findings(&scene));
         }
         findings.extend(misread);
-        findings.extend(poses::repeated(&scene));
         findings.extend(optics.findings(&scene));
         findings.sort_by_key(|finding| finding.severity);
-        Self { views: scene.views, gaze, coverage, optics, findings }
+        let same_pose = poses::repeated(&scene);
+        Self { views: scene.views, gaze, coverage, optics, same_pose, findings }
+    }
+
+    /// What stands out among the photos, of those that were looked at.
+    #[must_use]
+    pub fn findings_with(&self, gallery: Option<&Gallery>, dataset: &Dataset) -> Vec<Finding> {
+        let Some(gallery) = gallery else {
+            return poses::about_repeated(dataset, &self.same_pose, None).into_iter().collect();
+        };
+        let (differing, alike) =
+            self.same_pose.iter().partition::<Vec<[usize; 2]>, _>(|&&pair| gallery.differ(pair));
+        let mut findings = gallery.findings(dataset);
+        findings.extend(poses::about_repeated(dataset, &differing, Some(true)));
+        findings.extend(poses::about_repeated(dataset, &alike, Some(false)));
+        findings
     }
 }
 

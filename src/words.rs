@@ -1,5 +1,7 @@
 //! Numbers as people say them.
 
+use glam::DVec3;
+
 /// A duration as people say it.
 #[must_use]
 pub fn duration(seconds: f64) -> String {
@@ -51,11 +53,19 @@ pub fn length(value: f64) -> String {
     format!("{value:.*}", decimals as usize)
 }
 
+/// A point; what is nothing on the scale of its surroundings is 0.
+#[must_use]
+pub fn point(at: DVec3, scale: f64) -> String {
+    let [x, y, z] = at.to_array().map(|value| length(if value.abs() < 1e-4 * scale { 0.0 } else { value }));
+    format!("({x}, {y}, {z})")
+}
+
 /// A part of a whole.
 #[must_use]
 pub fn percent(part: f64) -> String {
     let percent = 100.0 * part;
-    if percent != 0.0 && percent.abs() < 9.95 { format!("{percent:.1} %") } else { format!("{percent:.0} %") }
+    let digits = usize::from((0.05..9.95).contains(&percent));
+    format!("{percent:.digits$} %")
 }
 
 /// `1 frame`, `2 frames`.
@@ -77,7 +87,8 @@ mod tests {
         assert_eq!(memory, ["7 bytes", "1.5 KiB", "400 MiB", "7.7 GiB"]);
         let lengths = [0.0, 1e-9, -0.04321, 1.5, -23.456, 123456.7, 2e7].map(length);
         assert_eq!(lengths, ["0", "1.00e-9", "-0.0432", "1.500", "-23.46", "123457", "2.00e7"]);
-        assert_eq!([0.0, 0.012, 0.5, 1.0].map(percent), ["0 %", "1.2 %", "50 %", "100 %"]);
+        assert_eq!(point(DVec3::new(1e-9, -2.0, 0.5), 4.0), "(0, -2.000, 0.500)");
+        assert_eq!([0.0, 0.0001, 0.012, 0.5, 1.0].map(percent), ["0 %", "0 %", "1.2 %", "50 %", "100 %"]);
         assert_eq!([count(1, "frame"), count(3, "frame")], ["1 frame", "3 frames"]);
     }
 }

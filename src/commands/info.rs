@@ -69,10 +69,10 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
     let mut gallery = None;
     if !args.no_photos && problems::found(dataset) > 0 {
         let (all, failures) = look(dataset, &survey.views, session);
-        problems.extend(all.findings(dataset));
         problems.extend(failures);
         gallery = Some(all);
     }
+    problems.extend(survey.findings_with(gallery.as_ref(), dataset));
     let mut memory = None;
     if !dataset.train.is_empty() {
         let estimate = Estimate::of(dataset, session)?;

@@ -29,7 +29,8 @@ pub(super) fn left_out(needs: &Needs, background: Background, dataset: &Dataset)
     ];
     let absent = LensKind::ALL.into_iter().filter(|kind| !needs.lenses.contains(kind));
     let absent: Vec<_> = absent.map(LensKind::name).collect();
-    let lenses = (!absent.is_empty()).then(|| format!("lens models {} (no camera has them)", absent.join("/")));
+    let lenses =
+        (!absent.is_empty()).then(|| format!("lens models {} (no camera has them)", absent.join("/")));
     let others = parts.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, part)| part.to_owned());
     lenses.into_iter().chain(others).collect()
 }

@@ -4,7 +4,7 @@ use super::gaze::Gaze;
 use super::{Finding, Scene};
 use crate::camera::Camera;
 use crate::dataset::focus::{Axis, FocusKind, find};
-use crate::words::{length, percent};
+use crate::words::{percent, point};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Fewer cameras meet somewhere by chance.
@@ -73,7 +73,7 @@ pub(super) fn examine(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
         percent(gaze.seeing),
         reading.name,
         percent(agreement.seeing),
-        point(agreement.focus),
+        point(agreement.focus, scene.extent()),
         percent(agreement.miss)
     );
     vec![if reading.is_turned_round && gaze.up.z > 0.5 {
@@ -112,8 +112,4 @@ fn agreement(scene: &Scene<'_>, turn: fn(DAffine3) -> DAffine3) -> Option<Agreem
     let miss = super::Spread::of(axes.iter().map(miss)).median;
     let agrees = focus.kind == FocusKind::Crossing && seeing >= ENOUGH_SEE && miss < NEAR;
     agrees.then_some(Agreement { focus: focus.point, seeing, miss })
-}
-
-fn point(at: DVec3) -> String {
-    format!("({}, {}, {})", length(at.x), length(at.y), length(at.z))
 }

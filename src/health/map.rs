@@ -10,11 +10,12 @@ pub use pixels::Picture;
 use super::{Spread, Survey};
 use crate::camera::Camera;
 use crate::dataset::{Bounds, Dataset, Split};
-use crate::words::{count, length};
+use crate::words::{count, length, point};
 use drawing::{Anchor, Color, Shape, Stroke};
 use glam::{DVec2, DVec3, dvec2};
 use panel::{Panel, Projection};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
 
 // Okabe and Ito's colours (2008), which readers with any colour vision tell apart.
 const TRAIN: Color = Color::rgb(0x00, 0x72, 0xB2);
@@ -47,13 +48,14 @@ pub fn draw(dataset: &Dataset, survey: &Survey, marked: &HashSet<usize>) -> Draw
     let corners = [dvec2(MARGIN, HEADER), dvec2(2.0 * MARGIN + width, HEADER)];
     let size = dvec2(width, SIZE.y - HEADER - FOOTER);
     let range = map.range(&projections, size);
+    let mut shows_whole_box = false;
     for ((projection, corner), title) in
         projections.into_iter().zip(corners).zip(["from above", "from the side"])
     {
         let panel = Panel { corner, size, projection, center: range.center, scale: range.scale };
-        map.draw_panel(&panel, title, &mut drawing);
+        shows_whole_box |= map.draw_panel(&panel, title, &mut drawing);
     }
-    map.draw_heading(&mut drawing);
+    map.draw_heading(shows_whole_box, &mut drawing);
     drawing
 }
 
@@ -61,6 +63,8 @@ struct Map<'a> {
     dataset: &'a Dataset,
     survey: &'a Survey,
     marked: &'a HashSet<usize>,
+    /// The colour of each image: of the splits that list it, the last one's.
+    colors: HashMap<&'a Path, Color>,
     /// Length of a frustum, in world units.
     frustum: f64,
 }
@@ -74,7 +78,14 @@ struct Range {
 
 impl<'a> Map<'a> {
     fn new(dataset: &'a Dataset, survey: &'a Survey, marked: &'a HashSet<usize>) -> Self {
-        let mut map = Self { dataset, survey, marked, frustum: 0.0 };
+        let split = |split, color| {
+            dataset.split(split).iter().map(move |&index| (dataset.frames[index].path.as_path(), color))
+        };
+        let colors = split(Split::Train, TRAIN)
+            .chain(split(Split::Val, VAL))
+            .chain(split(Split::Test, TEST))
+            .collect();
+        let mut map = Self { dataset, survey, marked, colors, frustum: 0.0 };
         let (low, high) = map.extent();
         let crowd = match survey.views.len() {
             0..40 => 0.07,
@@ -128,9 +139,10 @@ impl<'a> Map<'a> {
         Range { center, scale: 0.9 / widest }
     }
 
-    fn draw_panel(&self, panel: &Panel, title: &str, drawing: &mut Drawing) {
+    /// Returns whether some of the whole box is inside.
+    fn draw_panel(&self, panel: &Panel, title: &str, drawing: &mut Drawing) -> bool {
         drawing.push(Shape::rectangle(panel.corner, panel.size).with(Stroke::new(FAINT.faint(0.5), 1.0)));
-        self.draw_box(panel, drawing);
+        let shows_whole_box = self.draw_box(panel, drawing);
         let weight = (30.0 / self.survey.views.len() as f64).clamp(0.12, 0.6);
         for &frame in &self.survey.views {
             self.draw_axis(panel, frame, weight, drawing);
@@ -145,23 +157,27 @@ impl<'a> Map<'a> {
         panel.draw_scale(drawing);
         let at = panel.corner + dvec2(10.0, 20.0);
         drawing.text(at, &format!("{title}: {}", panel.projection.describe()), TEXT, INK, Anchor::Start);
+        shows_whole_box
     }
 
-    fn draw_box(&self, panel: &Panel, drawing: &mut Drawing) {
+    /// Returns whether some of the whole box is inside the panel.
+    fn draw_box(&self, panel: &Panel, drawing: &mut Drawing) -> bool {
         let bounds: &Bounds = &self.dataset.bounds;
         let cube = |half: f64| panel::corners(bounds.center - half, bounds.center + half);
         let edges = |corners: [DVec3; 8]| {
             let pairs = (0..8usize).flat_map(|a| [1, 2, 4].map(|bit| (a, a | bit))).filter(|(a, b)| a != b);
             pairs.map(move |(a, b)| [corners[a], corners[b]])
         };
+        let mut is_inside = false;
         if bounds.cascades > 1 {
             for edge in edges(cube(bounds.outer_half())) {
-                panel.line(edge, Stroke::new(FAINT, 1.0).dashed(), drawing);
+                is_inside |= panel.line(edge, Stroke::new(FAINT, 1.0).dashed(), drawing);
             }
         }
         for edge in edges(cube(bounds.half)) {
             panel.line(edge, Stroke::new(CUBE, 1.4), drawing);
         }
+        is_inside
     }
 
     /// The optical axis, up to where it is nearest to the focus.
@@ -237,18 +253,10 @@ impl<'a> Map<'a> {
         if self.marked.contains(&frame) {
             return MARKED;
         }
-        match [Split::Train, Split::Test, Split::Val]
-            .into_iter()
-            .find(|s| self.dataset.split(*s).contains(&frame))
-        {
-            Some(Split::Test) => TEST,
-            Some(Split::Val) => VAL,
-            Some(Split::Train) => TRAIN,
-            None => FAINT,
-        }
+        self.colors.get(self.dataset.frames[frame].path.as_path()).copied().unwrap_or(FAINT)
     }
 
-    fn draw_heading(&self, drawing: &mut Drawing) {
+    fn draw_heading(&self, shows_whole_box: bool, drawing: &mut Drawing) {
         let title = format!("{} of {}", count(self.survey.views.len(), "camera"), folder_name(self.dataset));
         drawing.text(dvec2(MARGIN, 28.0), &title, TITLE, INK, Anchor::Start);
         let number =
@@ -270,14 +278,14 @@ impl<'a> Map<'a> {
                 ) + 18.0;
             }
         }
-        for (stroke, name) in [
-            (Stroke::new(CUBE, 1.4), "inner cube of the box"),
-            (Stroke::new(FAINT, 1.0).dashed(), "whole box"),
-        ] {
-            if self.dataset.bounds.cascades == 1 && name == "whole box" {
-                continue;
-            }
-            let name = if self.dataset.bounds.cascades == 1 { "box" } else { name };
+        let is_whole = self.dataset.bounds.cascades == 1;
+        let mut lines =
+            vec![(Stroke::new(CUBE, 1.4), if is_whole { "box" } else { "inner cube of the box" })];
+        if !is_whole {
+            let name = if shows_whole_box { "whole box" } else { "whole box, beyond the picture" };
+            lines.push((Stroke::new(FAINT, 1.0).dashed(), name));
+        }
+        for (stroke, name) in lines {
             drawing.push(Shape::line([dvec2(x, 47.0), dvec2(x + 18.0, 47.0)]).with(stroke));
             x = drawing.text(dvec2(x + 23.0, 52.0), name, TEXT, INK, Anchor::Start) + 18.0;
         }
@@ -290,10 +298,8 @@ impl<'a> Map<'a> {
         let gaze = &self.survey.gaze;
         let focus = if gaze.meets { "the axes meet" } else { "the axes do not meet; the focus is" };
         format!(
-            "{focus} at ({}, {}, {}), {} from the cameras; the box is {} wide",
-            length(gaze.focus.x),
-            length(gaze.focus.y),
-            length(gaze.focus.z),
+            "{focus} at {}, {} from the cameras; the box is {} wide",
+            point(gaze.focus, gaze.distance.median),
             gaze.distance.tell(length),
             length(2.0 * self.dataset.bounds.outer_half())
         )

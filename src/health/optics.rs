@@ -32,7 +32,7 @@ const SQUARE: f64 = 0.02;
 const LEAST_FOV_DEGREES: f64 = 10.0;
 const MOST_FOV_DEGREES: f64 = 150.0;
 /// Farther off the middle, a picture was cropped or the numbers belong to another size.
-const FAR_OFF: f64 = 0.2;
+const FAR_OFF: f64 = 0.25;
 
 impl Optics {
     pub(super) fn of(scene: &Scene<'_>) -> Self {
@@ -78,7 +78,9 @@ fn fov_degrees(camera: &Camera) -> DVec2 {
     let size = size(camera);
     let half = |rim: DVec2| {
         let rays = camera.ray(0.5 * size).zip(camera.ray(rim * size));
-        rays.map_or(f64::NAN, |(middle, rim)| middle.direction.angle_between(rim.direction).to_degrees())
+        // Without the lens where it has no rays there.
+        let ideal = || ((rim - 0.5) * size / camera.focal_px).abs().max_element().atan();
+        rays.map_or_else(ideal, |(middle, rim)| middle.direction.angle_between(rim.direction)).to_degrees()
     };
     dvec2(half(dvec2(0.0, 0.5)) + half(dvec2(1.0, 0.5)), half(dvec2(0.5, 0.0)) + half(dvec2(0.5, 1.0)))
 }
@@ -108,10 +110,11 @@ fn odd_focal_lengths(scene: &Scene<'_>) -> Option<Finding> {
     let (focal, middle) = told?;
     Some(
         Finding::warning(format!(
-            "{} of {} a focal length unlike the others of the same size: {:.1} px instead of {middle:.1} px ({:+.1} %) in \
+            "{} of {} {} a focal length unlike the others of the same size: {:.1} px instead of {middle:.1} px ({:+.1} %) in \
              the first of {}; unless they were zoomed, correct their `fl_x` or drop them",
             odd.len(),
-            if scene.count() == 1 { "1 frame has".to_owned() } else { format!("{} frames have", scene.count()) },
+            count(scene.count(), "frame"),
+            if odd.len() == 1 { "has" } else { "have" },
             focal,
             100.0 * (focal / middle - 1.0),
             scene.names(&odd)

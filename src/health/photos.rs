@@ -5,7 +5,7 @@ mod grey;
 use super::{Finding, Severity, Spread, names};
 use crate::dataset::{Dataset, Photo};
 use crate::words::count;
-use grey::Grey;
+use grey::{Grey, THUMBNAIL};
 use std::collections::HashMap;
 
 /// Longest side that sharpness is measured at, in pixels: finer detail is noise as often as detail.
@@ -27,6 +27,8 @@ const DEVIATIONS: f64 = 6.0;
 /// Values up to here are black, and from here on white.
 const BLACK: f32 = 0.02;
 const WHITE: f32 = 0.98;
+/// Root mean square difference of thumbnails that show different things.
+const DIFFERENT: f64 = 0.03;
 /// Part of a photo that is.
 const NEARLY_ALL: f64 = 0.99;
 
@@ -47,6 +49,8 @@ pub struct Look {
     pub is_empty: bool,
     /// Tells pictures of different content apart.
     fingerprint: u64,
+    /// Brightness in coarse blocks, to compare photos of one pose.
+    thumbnail: [f32; THUMBNAIL * THUMBNAIL],
 }
 
 impl Look {
@@ -70,6 +74,7 @@ impl Look {
             white: white.filter(|_| !image.is_hdr()).unwrap_or(0.0),
             is_empty: brightness.is_none() || (!photo.ignored.is_empty() && photo.ignored.iter().all(|&i| i)),
             fingerprint: fine.fingerprint(),
+            thumbnail: coarse.thumbnail(),
         }
     }
 }
@@ -128,6 +133,14 @@ impl Gallery {
         );
         findings.sort_by_key(|finding| finding.severity);
         findings
+    }
+
+    /// Whether two frames, which have one pose, show different pictures.
+    pub(super) fn differ(&self, pair: [usize; 2]) -> bool {
+        let look = |index: usize| self.looks.iter().find(|(other, _)| *other == index).map(|(_, look)| look);
+        let [Some(a), Some(b)] = pair.map(look) else { return true };
+        let squares = a.thumbnail.iter().zip(b.thumbnail).map(|(a, b)| f64::from(a - b).powi(2));
+        squares.sum::<f64>() / a.thumbnail.len() as f64 > DIFFERENT.powi(2)
     }
 
     fn which(&self, holds: impl Fn(&(usize, Look)) -> bool) -> Vec<usize> {

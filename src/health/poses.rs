@@ -2,6 +2,7 @@
 
 use super::gaze::Gaze;
 use super::{Finding, Scene, Spread};
+use crate::dataset::Dataset;
 use crate::words::{count, length};
 use glam::DVec3;
 
@@ -121,8 +122,8 @@ fn away(scene: &Scene<'_>, gaze: &Gaze) -> Vec<usize> {
     (0..scene.count()).filter(is_away).collect()
 }
 
-/// Different images with the same pose.
-pub(super) fn repeated(scene: &Scene<'_>) -> Vec<Finding> {
+/// Pairs of frames with different images and the same pose; of several with one pose, each with the first.
+pub(super) fn repeated(scene: &Scene<'_>) -> Vec<[usize; 2]> {
     let extent = scene.extent();
     let cameras: Vec<_> = scene.cameras().collect();
     // All cameras at one place is another matter.
@@ -133,35 +134,49 @@ pub(super) fn repeated(scene: &Scene<'_>) -> Vec<Finding> {
         let (a, b) = (cameras[a].world_from_camera, cameras[b].world_from_camera);
         a.translation.distance(b.translation) <= SAME * extent && a.matrix3.abs_diff_eq(b.matrix3, SAME)
     };
+    let x = |view: usize| cameras[view].position().x;
     let mut order: Vec<usize> = (0..cameras.len()).collect();
-    order.sort_by(|&a, &b| {
-        let x = |view: usize| cameras[view].position().x;
-        x(a).total_cmp(&x(b))
-    });
-    let mut repeats = Vec::new();
+    order.sort_by(|&a, &b| x(a).total_cmp(&x(b)));
+    let mut pairs: Vec<[usize; 2]> = Vec::new();
     for (place, &view) in order.iter().enumerate() {
-        let x = cameras[view].position().x;
-        let near =
-            order[place + 1..].iter().take_while(|&&other| cameras[other].position().x - x <= SAME * extent);
-        repeats.extend(
-            near.filter(|&&other| is_same(view, other)).map(|&other| (view.min(other), view.max(other))),
-        );
+        let near = order[..place].iter().rev().take_while(|&&other| x(view) - x(other) <= SAME * extent);
+        if let Some(&first) = near.filter(|&&other| is_same(view, other)).last() {
+            pairs.push([view.min(first), view.max(first)]);
+        }
     }
-    let Some(&(first, second)) = repeats.iter().min() else { return Vec::new() };
-    let mut views: Vec<usize> = repeats.iter().flat_map(|&(a, b)| [a, b]).collect();
-    views.sort_unstable();
-    views.dedup();
-    let frames: Vec<usize> = views.into_iter().map(|view| scene.views[view]).collect();
-    let pair = [scene.views[first], scene.views[second]];
-    let message = format!(
-        "{} share their pose with another image: {} is where {} is{}; unless the scene moves or the light changes, one of \
-         the poses is wrong",
-        count(frames.len(), "image"),
-        scene.names(&pair[1..]),
-        scene.names(&pair[..1]),
-        if frames.len() > 2 { ", for example" } else { "" },
+    pairs.sort_unstable();
+    pairs.into_iter().map(|pair| pair.map(|view| scene.views[view])).collect()
+}
+
+/// What to say of frames with the same pose; whether their pictures differ may be unknown.
+pub(super) fn about_repeated(
+    dataset: &Dataset,
+    pairs: &[[usize; 2]],
+    differ: Option<bool>,
+) -> Option<Finding> {
+    let &[first, second] = pairs.first()?;
+    let mut frames = pairs.concat();
+    frames.sort_unstable();
+    frames.dedup();
+    let name = |frame: usize| &dataset.frames[frame].name;
+    let where_they_are = format!(
+        "{} share their pose with another one: {} is where {} is{}",
+        count(frames.len(), "frame"),
+        name(second),
+        name(first),
+        if pairs.len() > 1 { ", for example" } else { "" },
     );
-    vec![Finding::warning(message).about(frames)]
+    Some(match differ {
+        Some(true) => Finding::warning(format!(
+            "{where_they_are}, and their pictures differ; unless the scene moves or the light changes, correct or drop \
+             the wrong pose"
+        ))
+        .about(frames),
+        Some(false) => Finding::note(format!("{where_they_are}; their pictures look the same")),
+        None => Finding::note(format!(
+            "{where_they_are}; unless the camera stood still or the scene moves, one of the poses is wrong"
+        )),
+    })
 }
 
 #[cfg(test)]

@@ -2,9 +2,8 @@
 
 use super::memory::Estimate;
 use super::{Report, problems};
-use glam::DVec3;
 use nerf::health::{Arrangement, Gaze, Severity, Spread};
-use nerf::words::{bytes, count, length, percent, short};
+use nerf::words::{bytes, count, length, percent, point, short};
 
 /// Width of the headings at the left.
 const MARGIN: usize = 10;
@@ -107,8 +106,8 @@ impl Report<'_> {
         vec![
             format!(
                 "{} to {}, {} wide",
-                point(bounds.min()),
-                point(bounds.max()),
+                point(bounds.min(), bounds.half),
+                point(bounds.max(), bounds.half),
                 length(2.0 * bounds.outer_half())
             ),
             format!("{cubes}; {}", bounds.source),
@@ -188,19 +187,24 @@ fn center([x, y]: &[Spread; 2]) -> String {
 }
 
 fn about_gaze(gaze: &Gaze, views: usize) -> Vec<String> {
+    let focus = point(gaze.focus, gaze.distance.median);
+    if views == 1 {
+        return vec![format!(
+            "a single camera; taken for what it looks at: {focus}, {} away",
+            length(gaze.distance.median)
+        )];
+    }
     let focus = match gaze.meets {
-        true => format!("the optical axes meet near {}", point(gaze.focus)),
-        false => format!("the optical axes do not meet; taken for the focus: {}", point(gaze.focus)),
+        true => format!("the optical axes meet near {focus}"),
+        false => format!("the optical axes do not meet; taken for the focus: {focus}"),
     };
     let mut lines = vec![focus, format!("distance of the cameras from it {}", gaze.distance.tell(length))];
-    if views > 1 {
-        lines.push(format!(
-            "{} of the cameras see it; their axes pass it at {} of the distance, at worst {}",
-            percent(gaze.seeing),
-            percent(gaze.miss.median),
-            percent(gaze.miss.max)
-        ));
-    }
+    lines.push(format!(
+        "{} of the cameras see it; their axes pass it at {} of the distance, at worst {}",
+        percent(gaze.seeing),
+        percent(gaze.miss.median),
+        percent(gaze.miss.max)
+    ));
     lines.push(match gaze.arrangement {
         Arrangement::Single => "a single camera".to_owned(),
         Arrangement::Parallel { within_degrees } => {
@@ -210,7 +214,7 @@ fn about_gaze(gaze: &Gaze, views: usize) -> Vec<String> {
             format!("all look from one side, within {within_degrees:.0}° of their mean")
         }
         Arrangement::Around { covered_degrees, elevation_degrees: [low, high] } => {
-            format!("from {covered_degrees:.0}° around, {low:.0}° to {high:.0}° above")
+            format!("seen from {covered_degrees:.0}° around and {low:.0}° to {high:.0}° above")
         }
         Arrangement::Scattered => "they look outwards or past each other".to_owned(),
     });
@@ -233,8 +237,4 @@ fn about_memory(estimate: &Estimate) -> Vec<String> {
         format!("{} on the host besides, while loading", bytes(memory.host_bytes)),
         format!("the finest level of the grid has {finest} cells along an axis"),
     ]
-}
-
-fn point(at: DVec3) -> String {
-    format!("({}, {}, {})", length(at.x), length(at.y), length(at.z))
 }

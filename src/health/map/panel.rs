@@ -88,8 +88,8 @@ impl Panel {
         self.middle() + off / over.max(1.0)
     }
 
-    /// The part of a line between points of the world that is inside.
-    pub(super) fn line(&self, ends: [DVec3; 2], stroke: Stroke, drawing: &mut Drawing) {
+    /// Draws the part of a line between points of the world that is inside; returns whether there is any.
+    pub(super) fn line(&self, ends: [DVec3; 2], stroke: Stroke, drawing: &mut Drawing) -> bool {
         let [from, to] = ends.map(|end| self.place(end));
         // Liang and Barsky (1984).
         let mut part = [0.0, 1.0];
@@ -98,7 +98,7 @@ impl Panel {
             let (start, step) = (from[axis], to[axis] - from[axis]);
             for (distance, step) in [(start - low[axis], -step), (high[axis] - start, step)] {
                 if step == 0.0 && distance < 0.0 {
-                    return;
+                    return false;
                 }
                 if step < 0.0 {
                     part[0] = f64::max(part[0], distance / step);
@@ -107,9 +107,11 @@ impl Panel {
                 }
             }
         }
-        if part[0] < part[1] {
+        let is_inside = part[0] < part[1];
+        if is_inside {
             drawing.push(Shape::line(part.map(|at| from + at * (to - from))).with(stroke));
         }
+        is_inside
     }
 
     /// An arrow at the rim towards a point beyond it.

@@ -4,6 +4,9 @@ use crate::dataset::Photo;
 use crate::image::Pixels;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+/// Blocks along either side of a thumbnail.
+pub(super) const THUMBNAIL: usize = 12;
+
 /// A grey picture: display-referred brightness over black, and alpha.
 #[derive(Clone, Debug)]
 pub(super) struct Grey {
@@ -100,6 +103,19 @@ impl Grey {
         values.map(|value| {
             let sum: f64 = opaque().map(|&[v, alpha]| f64::from(value(v / alpha) * alpha)).sum();
             (weight > 0.0).then(|| sum / weight)
+        })
+    }
+
+    /// Means over a grid of blocks, which need not be of one size.
+    pub(super) fn thumbnail(&self) -> [f32; THUMBNAIL * THUMBNAIL] {
+        std::array::from_fn(|index| {
+            let span = |at: usize, size: usize| {
+                let from = at * size / THUMBNAIL;
+                from..((at + 1) * size / THUMBNAIL).max(from + 1).min(size)
+            };
+            let (columns, rows) = (span(index % THUMBNAIL, self.width), span(index / THUMBNAIL, self.height));
+            let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+            mean(pixels.map(|(x, y)| self.at(x, y))) as f32
         })
     }
 
