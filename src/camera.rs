@@ -63,6 +63,29 @@ impl Camera {
         Some((plane * self.focal_px + self.center_px, depth))
     }
 
+    /// How many pixels a world unit across the view covers at `distance` from the camera, near the view axis.
+    pub fn pixels_per_length(&self, distance: f64) -> f64 {
+        let focal_px = self.focal_px.max_element();
+        if self.lens == Lens::Orthographic { focal_px } else { focal_px / distance }
+    }
+
+    /// Where a ball is imaged: a point of pixel space, and a distance from it in pixels that holds the whole image.
+    /// `None` where there is no such disc, or none that is worth computing: at the rim of a lens, where an image
+    /// wraps around, and around the camera.
+    pub fn footprint(&self, center: DVec3, radius: f64) -> Option<(DVec2, f64)> {
+        let seen = self.world_from_camera.inverse().transform_point3(center);
+        let (plane, depth) = self.lens.image(seen)?;
+        let reach = match &self.lens {
+            Lens::Pinhole | Lens::OpenCv { .. } => radius / depth,
+            Lens::Orthographic => radius,
+            Lens::Fisheye { .. } | Lens::Equirectangular => {
+                let spread = (radius / depth).asin();
+                self.lens.stretch(plane, seen, spread)? * spread
+            }
+        };
+        Some((plane * self.focal_px + self.center_px, reach * self.focal_px.max_element()))
+    }
+
     /// Unit view direction in world space.
     pub fn forward(&self) -> DVec3 {
         -self.world_from_camera.matrix3.z_axis
@@ -71,6 +94,13 @@ impl Camera {
     /// Centre of projection in world space; for parallel rays the principal point on the image plane.
     pub fn position(&self) -> DVec3 {
         self.world_from_camera.translation
+    }
+
+    /// The part of the view inside a window of `size` pixels, whose top-left corner is at `corner`, in pixels.
+    pub fn cropped(&self, corner: [u32; 2], size: [u32; 2]) -> Self {
+        let [left, top] = corner.map(f64::from);
+        let [width, height] = size;
+        Self { width, height, center_px: self.center_px - DVec2::new(left, top), ..*self }
     }
 
     /// The same view at another image size in pixels; the intrinsics scale along.
@@ -130,12 +160,12 @@ mod tests {
         ]
     }
 
-    /// Every seventh pixel of both axes in full size, and all pixels of the first and last rows.
+    /// Every third pixel of both axes in full size, and all pixels of the first and last rows.
     fn pixels(camera: &Camera) -> impl Iterator<Item = DVec2> {
         let (width, height) = (camera.width, camera.height);
-        let rows = (0..height).filter(move |y| y % 7 == 0 || *y == height - 1);
+        let rows = (0..height).filter(move |y| y % 3 == 0 || *y == height - 1);
         let all = rows.flat_map(move |y| (0..width).map(move |x| (x, y)));
-        all.filter(move |(x, y)| x % 7 == 0 || *y == 0 || *y == height - 1 || *x == width - 1)
+        all.filter(move |(x, y)| x % 3 == 0 || *y == 0 || *y == height - 1 || *x == width - 1)
             .map(|(x, y)| DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
     }
 
@@ -179,9 +209,9 @@ mod tests {
         assert!(at(1.82).is_some() && at(1.83).is_none());
         // Without distortion, straight back is the last circle.
         let round = super::tests::camera(Lens::Fisheye { k: [0.0; 4] });
-        assert!(seen(&round, DVec2::new(-3.14, 0.0)) && !seen(&round, DVec2::new(-3.15, 0.0)));
+        assert!(seen(&round, DVec2::new(-3.13, 0.0)) && !seen(&round, DVec2::new(-3.15, 0.0)));
         let sphere = super::tests::camera(Lens::Equirectangular);
-        assert!(seen(&sphere, DVec2::new(3.14, -1.57)));
+        assert!(seen(&sphere, DVec2::new(3.13, -1.56)));
         assert!(!seen(&sphere, DVec2::new(3.15, 0.0)) && !seen(&sphere, DVec2::new(0.0, 1.58)));
         for lens in [camera.clone(), fisheye, round, sphere] {
             assert_eq!(lens.project(lens.position()), None);
@@ -250,6 +280,48 @@ mod tests {
         assert!(right.origin.distance(camera.position() + axes.x_axis) < 1e-12);
         assert!(down.origin.distance(camera.position() - axes.y_axis) < 1e-12);
         assert_eq!(right.direction, down.direction);
+    }
+
+    #[test]
+    fn a_cropped_camera_sees_the_same() {
+        let camera = camera(lenses()[1].0);
+        let part = camera.cropped([30, 200], [500, 700]);
+        assert_eq!((part.width, part.height), (500, 700));
+        let whole = camera.ray(DVec2::new(100.0, 250.0)).expect("inside");
+        let same = part.ray(DVec2::new(70.0, 50.0)).expect("inside");
+        assert!(whole.direction.distance(same.direction) < 1e-14);
+    }
+
+    #[test]
+    fn a_footprint_holds_the_image_of_a_ball() {
+        for lens in [
+            Lens::Orthographic,
+            Lens::Equirectangular,
+            Lens::Fisheye { k: [0.0; 4] },
+            Lens::Fisheye { k: [-0.02, 0.003, -0.0006, 0.00001] },
+            Lens::Fisheye { k: [0.4, 0.2, 0.1, 0.05] },
+            Lens::Fisheye { k: [-0.25, 0.02, 0.0, 0.0] },
+        ] {
+            let camera = camera(lens);
+            let (mut held, mut largest) = (0, 0.0f64);
+            for index in 0..400 {
+                let turn = f64::from(index) * 2.4;
+                let height = 1.0 - (f64::from(index) + 0.5) / 200.0;
+                let flat = (1.0 - height * height).sqrt();
+                let out = DVec3::new(flat * turn.cos(), flat * turn.sin(), height);
+                let (center, radius) = (camera.position() + 3.0 * out, 0.05 + 0.002 * f64::from(index % 100));
+                let Some((middle, reach)) = camera.footprint(center, radius) else { continue };
+                held += 1;
+                for step in 0..60 {
+                    let turn = f64::from(step) * 2.4;
+                    let side = DVec3::new(turn.cos(), turn.sin(), 0.1 * f64::from(step) - 3.0).normalize();
+                    let Some((pixel, _)) = camera.project(center + radius * side) else { continue };
+                    assert!(pixel.distance(middle) <= reach * (1.0 + 1e-9), "{lens:?} {out} {radius}");
+                    largest = largest.max(pixel.distance(middle) / reach);
+                }
+            }
+            assert!(held > 50 && largest > 0.8, "{lens:?}: {held} footprints, {largest} of them filled");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! `occupancy_bits`. The metadata entry [`KEY`] holds [`About`] as JSON.
 
 use crate::config::Config;
-use crate::dataset::{Bounds, Split};
+use crate::dataset::{Bounds, Reading, Split};
 use crate::file::write_atomically;
 use crate::kernels::Needs;
 use crate::kernels::training::STATE;
@@ -22,7 +22,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The layout of the file that this version writes and reads.
-pub const FORMAT: u64 = 1;
+pub const FORMAT: u64 = 2;
 /// The key of the metadata entry.
 pub const KEY: &str = "nerf";
 /// The file's name in the folder of a training.
@@ -63,6 +63,8 @@ pub struct About {
     pub bounds: Bounds,
     /// What the kernels were linked with.
     pub needs: Needs,
+    /// How the photos were read.
+    pub reading: Reading,
     /// Which frames were trained on, and which were not.
     pub splits: Splits,
     /// Median width and height of the training images, in pixels.
@@ -275,6 +277,7 @@ mod tests {
             config,
             bounds,
             needs,
+            reading: Reading { downscale: 2, ..Reading::default() },
             splits: Splits { train: vec!["a".into()], ..Splits::default() },
             image_size: [30, 20],
             has_alpha: true,
@@ -329,8 +332,8 @@ mod tests {
         let (_folder, path) = saved();
         let text = |about: &About| serde_json::to_string(about).expect("JSON");
         let about = checkpoint().about;
-        let newer = About { format: 2, ..about.clone() };
-        assert!(format!("{:#}", About::parse(&text(&newer)).expect_err("newer")).contains("found 2"));
+        let newer = About { format: FORMAT + 1, ..about.clone() };
+        assert!(format!("{:#}", About::parse(&text(&newer)).expect_err("newer")).contains("found 3"));
         let bytes = std::fs::read(&path).expect("readable");
         let (from, to) = (r#"\"log2_table\":8"#, r#"\"log2_table\":9"#);
         let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect("there");

@@ -2,7 +2,9 @@
 
 pub(crate) mod bench;
 pub(crate) mod check;
+pub(crate) mod generate;
 pub(crate) mod info;
+pub(crate) mod reading;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::config::Background;
@@ -56,7 +58,7 @@ pub(crate) enum Command {
     /// Look at a dataset before training on it: what was read, what was assumed, what is wrong
     Info(info::Info),
     /// Write an analytic scene with exact ground truth as a dataset
-    Generate(Generate),
+    Generate(generate::Generate),
     /// Measure error against run time
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -113,6 +115,9 @@ pub(crate) struct Train {
     /// Do not measure the test views at the end
     #[arg(long)]
     pub(crate) no_eval: bool,
+    /// How photos are read.
+    #[command(flatten)]
+    pub(crate) reading: reading::Reading,
 }
 
 /// `nerf render`
@@ -179,6 +184,9 @@ pub(crate) struct Eval {
     /// Write the renderings, over the background, as PNG to this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) save: Option<PathBuf>,
+    /// How photos are read.
+    #[command(flatten)]
+    pub(crate) reading: reading::Reading,
 }
 
 /// `nerf report`
@@ -192,38 +200,9 @@ pub(crate) struct Report {
     /// The page to write [default: RUN/report.html]
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
-}
-
-/// `nerf generate`
-#[derive(Args, Debug)]
-pub(crate) struct Generate {
-    /// Name of the scene; see --list
-    #[arg(required_unless_present = "list")]
-    pub(crate) scene: Option<String>,
-    /// New or empty folder to write the dataset to
-    #[arg(long, value_name = "DIR", required_unless_present = "list")]
-    pub(crate) out: Option<PathBuf>,
-    /// List the scenes
-    #[arg(long)]
-    pub(crate) list: bool,
-    /// Views in all splits
-    #[arg(long, value_name = "N", default_value = "100")]
-    pub(crate) views: usize,
-    /// Size of the images in pixels, WxH or N for NxN
-    #[arg(long, value_name = "WxH", default_value = "200", value_parser = size)]
-    pub(crate) size: (u32, u32),
-    /// Scene-linear OpenEXR images instead of PNG
-    #[arg(long)]
-    pub(crate) hdr: bool,
-    /// Cameras with lens distortion
-    #[arg(long)]
-    pub(crate) lens: bool,
-    /// Sub-rays per pixel along each axis
-    #[arg(long, value_name = "N", default_value = "4")]
-    pub(crate) samples: u32,
-    /// Varies where the cameras are
-    #[arg(long, value_name = "K", default_value = "0")]
-    pub(crate) seed: u64,
+    /// How photos are read.
+    #[command(flatten)]
+    pub(crate) reading: reading::Reading,
 }
 
 /// A file format to render to.

@@ -8,16 +8,17 @@ mod exam;
 mod field;
 mod generate;
 mod info;
-mod needs;
 mod render;
 mod report;
 mod scores;
 mod train;
 
+use crate::cli::reading::Reading;
 use crate::cli::{Cli, Command, Global};
 use crate::remarks::Remarks;
 use anyhow::{Context, Result};
-use nerf::dataset::Dataset;
+use nerf::checkpoint::About;
+use nerf::dataset::{Dataset, OpenOptions};
 use nerf::gpu::{Gpu, adapter};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -90,6 +91,12 @@ fn writable_folder(path: &Path) -> Result<()> {
     let attempt = tempfile::Builder::new().prefix(".nerf-").tempfile_in(path);
     attempt.with_context(|| format!("the folder {show} cannot be written to"))?;
     Ok(())
+}
+
+/// Opens a dataset to compare a field with: the photos are read as the command line says, else as for the training.
+fn open_to_compare(path: &Path, reading: &Reading, about: &About) -> Result<Dataset> {
+    let reading = reading.over(about.reading.clone());
+    Dataset::open(path, &OpenOptions { reading, ..OpenOptions::default() })
 }
 
 /// The indices of the frames called `names`, and the names that the dataset lacks.

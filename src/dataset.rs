@@ -8,26 +8,30 @@ pub(crate) mod focus;
 mod frames;
 mod intrinsics;
 mod json;
+mod located;
+mod look_ahead;
 mod notes;
 mod open;
 mod photo;
 mod pose;
+mod reading;
+mod sidecars;
 mod splits;
 pub mod transforms;
 
 use std::path::PathBuf;
 
-use anyhow::{Result, ensure};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
-use crate::image::Image;
+use crate::image::BitDepth;
 pub use bounds::Bounds;
 pub use intrinsics::Intrinsics;
 pub use notes::{Note, Severity};
 pub use open::read_cameras;
 pub use photo::Photo;
+pub use reading::{AlphaMode, Crop, Reading};
+pub use sidecars::DepthEntry;
 pub use splits::HoldOut;
 
 /// A dataset: what is listed, what was found, and what was assumed.
@@ -53,6 +57,10 @@ pub struct Dataset {
     pub missing: Vec<String>,
     /// Whether the images are scene-linear.
     pub is_hdr: bool,
+    /// How finely the finest image is stored; every photo is loaded in this depth.
+    pub bit_depth: BitDepth,
+    /// How photos are read, with an alpha that is never [`AlphaMode::Auto`].
+    pub reading: Reading,
     /// Whether images are cut out: the first training image has transparent pixels.
     pub is_cutout: bool,
     /// What was assumed, repaired or looks wrong.
@@ -68,10 +76,19 @@ pub struct Frame {
     pub name: String,
     /// The image file.
     pub path: PathBuf,
-    /// The camera, at the image's own size.
+    /// The camera, at the size that photos are loaded in: after the crop and the downscale.
     pub camera: Camera,
-    /// Whether the image file has an alpha channel.
+    /// Whether the photo has alpha, in its own file or in one beside it.
     pub has_alpha: bool,
+    /// How finely the image file's pixels are stored.
+    pub bits: BitDepth,
+    /// Whether there is a mask.
+    pub has_mask: bool,
+    /// Whether there is a depth file.
+    pub has_depth: bool,
+    /// Whether the alpha is in the image file.
+    has_own_alpha: bool,
+    source: photo::Source,
 }
 
 /// A part of a dataset.
@@ -87,13 +104,15 @@ pub enum Split {
 }
 
 /// Choices when opening a dataset.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct OpenOptions {
     /// What to hold out where the dataset has no test or validation split.
     pub hold_out: HoldOut,
     /// Where no image at all is present: open the dataset all the same, with every listed frame and the
     /// sizes the file declares. Such a dataset cannot load images.
     pub allow_missing: bool,
+    /// How photos are read.
+    pub reading: Reading,
 }
 
 impl Dataset {
@@ -116,27 +135,5 @@ impl Dataset {
             }
         }
         distinct.len()
-    }
-
-    /// Decodes the images of some frames, in their order, in parallel. `progress` is told each time how
-    /// many are done, from any thread.
-    pub fn load_images(&self, indices: &[usize], progress: &(dyn Fn(usize) + Sync)) -> Result<Vec<Image>> {
-        let done = std::sync::atomic::AtomicUsize::new(0);
-        let load = |&index: &usize| {
-            let Frame { camera, path, .. } = &self.frames[index];
-            let image = Image::load(path)?;
-            ensure!(
-                (image.width, image.height) == (camera.width, camera.height),
-                "{} had {}x{} pixels when the dataset was opened and has {}x{} now; start again",
-                path.display(),
-                camera.width,
-                camera.height,
-                image.width,
-                image.height
-            );
-            progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed));
-            Ok(image)
-        };
-        indices.par_iter().map(load).collect()
     }
 }

@@ -20,8 +20,8 @@
 //!
 //! - World space is the dataset's own, in its own units. The cube that the grid covers is internal.
 //! - Camera axes are OpenGL's: +X right, +Y up, the camera looks along -Z. Pixel centres lie at `+0.5`.
-//! - A field of 8-bit images holds display-referred (sRGB) colours, and is composited as such; a field of
-//!   OpenEXR images holds linear light. Rendered colours are premultiplied by their opacity.
+//! - A field of images in 8 or 16 bits holds display-referred (sRGB) colours, and is composited as such; a field
+//!   of OpenEXR or Radiance HDR images holds linear light. Rendered colours are premultiplied by their opacity.
 //! - Depth is the mean distance along the view axis, in world units.
 //! - Gradients are called `d_<name>` for the derivative of the loss by `<name>`.
 //!
@@ -34,7 +34,8 @@
 //!
 //! # fn main() -> anyhow::Result<()> {
 //! let dataset = Dataset::open(Path::new("data/lego"), &Default::default())?;
-//! let images = dataset.load_images(&dataset.train, &|_| {})?;
+//! let mut images = Vec::new();
+//! dataset.stream(&dataset.train, false, &mut |_, photo| Ok(images.push(photo.image)))?;
 //! let cameras: Vec<_> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
 //! let gpu = Arc::new(gpu::Gpu::open(&gpu::adapter::choose(None)?)?);
 //! let config = Config::default();

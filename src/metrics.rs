@@ -3,6 +3,8 @@
 //! Colours are display-referred with a data range of 1. Images are row-major, `[height * width]`
 //! pixels of three channels. Predictions are clamped to `[0, 1]` (NaN counts as 0) and not quantised.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 /// The PSNR, in decibels, at which [`psnr`] saturates; identical images would otherwise give infinity,
@@ -39,6 +41,37 @@ pub fn mse(prediction: &[[f32; 3]], target: &[[f32; 3]]) -> f64 {
 /// If the images differ in their number of pixels.
 pub fn psnr(prediction: &[[f32; 3]], target: &[[f32; 3]]) -> f64 {
     (-10.0 * mse(prediction, target).log10()).min(PSNR_CAP_DB)
+}
+
+/// The PSNR over the pixels that are not `ignored`; over all where `ignored` is empty. [`PSNR_CAP_DB`] where none
+/// is left.
+///
+/// # Panics
+/// If the images, or the flags of some, differ in their number of pixels.
+pub fn psnr_where(prediction: &[[f32; 3]], target: &[[f32; 3]], ignored: &[bool]) -> f64 {
+    if ignored.is_empty() {
+        return psnr(prediction, target);
+    }
+    psnr(&kept(prediction, ignored), &kept(target, ignored))
+}
+
+/// The prediction with the target's colours where the pixel is `ignored`, so that nothing differs there; as it
+/// is where `ignored` is empty.
+///
+/// # Panics
+/// If the images, or the flags of some, differ in their number of pixels.
+pub fn filled<'a>(prediction: &'a [[f32; 3]], target: &[[f32; 3]], ignored: &[bool]) -> Cow<'a, [[f32; 3]]> {
+    if ignored.is_empty() {
+        return Cow::Borrowed(prediction);
+    }
+    assert_eq!((prediction.len(), target.len()), (ignored.len(), ignored.len()), "a flag for every pixel");
+    let pairs = prediction.iter().zip(target).zip(ignored);
+    pairs.map(|((&predicted, &wanted), &ignored)| if ignored { wanted } else { predicted }).collect()
+}
+
+fn kept(pixels: &[[f32; 3]], ignored: &[bool]) -> Vec<[f32; 3]> {
+    assert_eq!(pixels.len(), ignored.len(), "a flag for every pixel");
+    pixels.iter().zip(ignored).filter(|(_, ignored)| !**ignored).map(|(&pixel, _)| pixel).collect()
 }
 
 /// Structural similarity (Wang et al. 2004): per channel
@@ -175,6 +208,19 @@ mod tests {
         assert_eq!(psnr(&[], &[]), PSNR_CAP_DB);
         assert_eq!(psnr(&[[7.0, -3.0, f32::NAN]], &[[1.0, 0.0, 0.0]]), PSNR_CAP_DB);
         assert_eq!(psnr(&[[0.0; 3]], &[[1.0; 3]]), 0.0);
+    }
+
+    #[test]
+    fn ignored_pixels_add_no_error() {
+        // The second pixel's error of 1 does not count: 20 dB of the first alone.
+        let (predicted, gray) = ([[0.6; 3], [1.0; 3]], [[0.5; 3], [0.0; 3]]);
+        assert!((psnr_where(&predicted, &gray, &[false, true]) - 20.0).abs() < 1e-5);
+        assert_eq!(psnr_where(&predicted, &gray, &[]), psnr(&predicted, &gray));
+        assert_eq!(psnr_where(&predicted, &gray, &[true, true]), PSNR_CAP_DB);
+        assert_eq!(*filled(&predicted, &gray, &[false, true]), [[0.6; 3], [0.0; 3]]);
+        assert_eq!(*filled(&predicted, &gray, &[]), predicted);
+        let (x, y) = (pattern(20, 20, 1), pattern(20, 20, 2));
+        assert!((ssim(&filled(&x, &y, &[true; 400]), &y, 20, 20) - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -161,7 +161,7 @@ const MOST_CELLS: f64 = 65536.0;
 #[must_use]
 pub fn finest_resolution(base: u32, bounds: &Bounds, cameras: &[Camera]) -> u32 {
     let sharpness = |camera: &Camera| {
-        camera.focal_px.max_element() / camera.position().distance(bounds.center).max(0.1 * bounds.half)
+        camera.pixels_per_length(camera.position().distance(bounds.center).max(0.1 * bounds.half))
     };
     let mut pixels_per_length: Vec<f64> = cameras.iter().map(sharpness).collect();
     pixels_per_length.sort_by(f64::total_cmp);
@@ -222,5 +222,10 @@ mod tests {
         assert_eq!(finest_resolution(256, &bounds(1), &cameras), 256);
         assert_eq!(finest_resolution(16, &bounds(1), &[]), 16);
         assert_eq!(finest_resolution(16, &bounds(1), &[camera(0.0)]), 6000);
+        // Parallel rays are as dense at any distance.
+        let parallel = Camera { lens: Lens::Orthographic, ..camera(40.0) };
+        assert_eq!(finest_resolution(16, &bounds(1), &[parallel]), 600);
+        let sphere = Camera { lens: Lens::Equirectangular, ..camera(4.0) };
+        assert_eq!(finest_resolution(16, &bounds(1), &[sphere]), 150);
     }
 }

@@ -1,6 +1,6 @@
 //! Views all around a scene, from what the training cameras had in common.
 
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, Lens, LensKind};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -15,6 +15,8 @@ pub struct Orbit {
     pub height: u32,
     /// Focal length in pixels.
     pub focal_px: f64,
+    /// Whether the world is left-handed: its cameras are mirrored.
+    pub left_handed: bool,
     /// Unit vector that points up, in world space.
     pub up: DVec3,
     /// Distance of the cameras from the centre, in world units.
@@ -25,6 +27,8 @@ pub struct Orbit {
 
 /// Steeper than this the direction that is up in the image would be ill-defined.
 const STEEPEST_RAD: f64 = 1.3;
+/// Half the field of view of an orbit around what very wide lenses saw.
+const WIDEST_RAD: f64 = TAU / 12.0;
 
 impl Orbit {
     /// The circle through the middle of `cameras`, whose scene lies around `center`.
@@ -37,11 +41,13 @@ impl Orbit {
             direction.dot(up).clamp(-1.0, 1.0).asin()
         };
         let width = over(&|camera| f64::from(camera.width)).max(1.0);
-        let tangent = over(&|camera| f64::from(camera.width) / camera.focal_px.x);
+        let tangent = over(&|camera| tangent(camera, center));
+        let hand = over(&|camera| camera.world_from_camera.matrix3.determinant());
         Self {
             width: width as u32,
             height: over(&|camera| f64::from(camera.height)).max(1.0) as u32,
             focal_px: width / tangent.max(1e-6),
+            left_handed: hand < 0.0,
             up,
             radius: over(&|camera| camera.position().distance(center)).max(1e-9),
             elevation_rad: over(&elevation).clamp(-STEEPEST_RAD, STEEPEST_RAD),
@@ -59,7 +65,8 @@ impl Orbit {
                 let (lift, reach) = self.elevation_rad.sin_cos();
                 let back = (reach * (cos * east + sin * north) + lift * self.up).normalize();
                 let right = self.up.cross(back).normalize();
-                let axes = DMat3::from_cols(right, back.cross(right), back);
+                let up = back.cross(right);
+                let axes = DMat3::from_cols(if self.left_handed { -right } else { right }, up, back);
                 Camera {
                     width: self.width,
                     height: self.height,
@@ -70,6 +77,17 @@ impl Orbit {
                 }
             })
             .collect()
+    }
+}
+
+/// Width of a pinhole's view over the distance that shows what `camera` shows around `center`; 60 degrees where it
+/// sees more than it is pointed at.
+fn tangent(camera: &Camera, center: DVec3) -> f64 {
+    let width = f64::from(camera.width) / camera.focal_px.x;
+    match camera.lens.kind() {
+        LensKind::Pinhole | LensKind::OpenCv => width,
+        LensKind::Orthographic => width / camera.position().distance(center).max(1e-9),
+        LensKind::Fisheye | LensKind::Equirectangular => 2.0 * (0.5 * width).min(WIDEST_RAD).tan(),
     }
 }
 
@@ -108,6 +126,7 @@ mod tests {
             width: 320,
             height: 200,
             focal_px: 300.0,
+            left_handed: false,
             up: up.normalize(),
             radius: 3.0,
             elevation_rad: 0.4,
@@ -136,6 +155,29 @@ mod tests {
             assert!((above.x - 160.0).abs() < 1e-9 && above.y < 100.0);
             assert!((camera.world_from_camera.matrix3.determinant() - 1.0).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn other_lenses_and_hands_become_a_similar_view() {
+        let pinholes = orbit(DVec3::Z).cameras(CENTER, 9);
+        let focal_px = |lens: Lens, focal_px: f64| {
+            let cameras = pinholes.iter();
+            let cameras: Vec<_> = cameras
+                .map(|camera| Camera { lens, focal_px: DVec2::splat(focal_px), ..camera.clone() })
+                .collect();
+            Orbit::of(&cameras, CENTER).focal_px
+        };
+        // 100 pixels per unit at the distance of 3, and 300 per radian near the axis.
+        assert!((focal_px(Lens::Orthographic, 100.0) - 300.0).abs() < 1e-6);
+        assert!((focal_px(Lens::Fisheye { k: [0.0; 4] }, 306.0) - 277.6).abs() < 1.0);
+        assert!((focal_px(Lens::Equirectangular, 320.0 / TAU) - 160.0 / WIDEST_RAD.tan()).abs() < 1e-6);
+        let mirrored = Orbit { left_handed: true, ..orbit(DVec3::Z) };
+        let cameras = mirrored.cameras(CENTER, 9);
+        assert!(cameras.iter().all(|camera| camera.world_from_camera.matrix3.determinant() < -0.99));
+        let found = Orbit::of(&cameras, CENTER);
+        assert!(found.left_handed && found.up.distance(mirrored.up) < 1e-6);
+        let (pixel, _) = cameras[0].project(CENTER + 0.1 * DVec3::Z).expect("in front");
+        assert!((pixel.x - 160.0).abs() < 1e-9 && pixel.y < 100.0);
     }
 
     #[test]

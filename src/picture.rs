@@ -74,25 +74,25 @@ impl ColorSpace {
     }
 }
 
-/// The display-referred colours in `[0, 1]` of a photo over a display-referred `background`: 8-bit images are
-/// composited as they are encoded, linear ones in linear light.
+/// The display-referred colours in `[0, 1]` of a photo over a display-referred `background`: images in 8
+/// or 16 bits are composited as they are encoded, linear ones in linear light.
 #[must_use]
 pub fn photo_over(image: &Image, background: [f32; 3]) -> Vec<[f32; 3]> {
     match &image.pixels {
-        Pixels::Srgb8(pixels) => srgb_over(pixels, 255.0, background),
-        Pixels::Srgb16(pixels) => srgb_over(pixels, 65_535.0, background),
+        Pixels::Srgb8(pixels) => ColorSpace::Srgb.over(&premultiplied(pixels, 255.0), background),
+        Pixels::Srgb16(pixels) => ColorSpace::Srgb.over(&premultiplied(pixels, 65535.0), background),
         Pixels::Linear(pixels) => ColorSpace::Linear.over(pixels, background),
     }
 }
 
-/// Straight sRGB pixels whose values reach up to `most`, as they are encoded, over a background.
-fn srgb_over<T: Copy + Into<f32>>(pixels: &[[T; 4]], most: f32, background: [f32; 3]) -> Vec<[f32; 3]> {
-    let premultiplied = |pixel: &[T; 4]| {
-        let [r, g, b, alpha] = pixel.map(|value| value.into() / most);
-        [r * alpha, g * alpha, b * alpha, alpha]
+/// Pixels with straight alpha whose whole numbers mean parts of `one`.
+fn premultiplied<T: Copy + Into<f32>>(pixels: &[[T; 4]], one: f32) -> Vec<[f32; 4]> {
+    let pixel = |&[r, g, b, a]: &[T; 4]| {
+        let alpha = a.into() / one;
+        let [r, g, b] = [r, g, b].map(|value| value.into() / one * alpha);
+        [r, g, b, alpha]
     };
-    let pixels: Vec<_> = pixels.iter().map(premultiplied).collect();
-    ColorSpace::Srgb.over(&pixels, background)
+    pixels.iter().map(pixel).collect()
 }
 
 /// Opaque 8-bit pixels of display-referred colours in `[0, 1]`.

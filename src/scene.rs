@@ -15,6 +15,7 @@ mod texture;
 mod toys;
 mod world;
 
+use crate::camera::LensKind;
 use crate::image::srgb_from_linear;
 use anyhow::{Result, bail};
 use fog::Fog;
@@ -37,7 +38,7 @@ const TOYS: SceneInfo = SceneInfo {
 };
 const COURTYARD: SceneInfo = SceneInfo {
     name: "courtyard",
-    description: "an opaque handheld capture among columns and walls under a sky; takes --lens",
+    description: "an opaque handheld capture among columns and walls under a sky",
 };
 const FOG: SceneInfo = SceneInfo {
     name: "fog",
@@ -178,8 +179,8 @@ pub struct Generate {
     pub size: (u32, u32),
     /// Linear EXR with values above 1, instead of 8-bit PNG.
     pub hdr: bool,
-    /// An OpenCV lens distortion; for scenes with full intrinsics only.
-    pub lens: bool,
+    /// The lenses of the cameras, taken in turn; at least one.
+    pub lenses: Vec<LensKind>,
     /// Sub-rays per pixel along each axis.
     pub samples: u32,
     /// Varies the camera positions.
@@ -190,11 +191,11 @@ impl Generate {
     /// `scene` with 100 views of 200×200 pixels and 4×4 sub-rays.
     pub fn new(scene: &str) -> Self {
         let views = Views { train: 82, val: 6, test: 12 };
-        let scene = scene.to_owned();
-        Self { scene, views, size: (200, 200), hdr: false, lens: false, samples: 4, seed: 0 }
+        let (scene, lenses) = (scene.to_owned(), vec![LensKind::Pinhole]);
+        Self { scene, views, size: (200, 200), hdr: false, lenses, samples: 4, seed: 0 }
     }
 
-    fn check(&self, scene: &Scene) -> Result<()> {
+    fn check(&self) -> Result<()> {
         let (width, height) = self.size;
         if !(1..=16_384).contains(&width) || !(1..=16_384).contains(&height) {
             bail!("images of {width}x{height} pixels; each side must be within 1..=16384");
@@ -205,11 +206,8 @@ impl Generate {
         if self.views.train == 0 {
             bail!("no views to train on; ask for at least one");
         }
-        if self.lens && !scene.is_opaque() {
-            let name = scene.info.name;
-            bail!(
-                "`{name}` is written with `camera_angle_x` alone, which cannot describe a lens; use `courtyard`"
-            );
+        if self.lenses.is_empty() {
+            bail!("no lens to look through; name at least one");
         }
         Ok(())
     }
@@ -235,6 +233,6 @@ pub struct Summary {
 /// If the options do not fit the scene, the folder is in use, or a file cannot be written.
 pub fn generate(options: &Generate, out: &Path, progress: &(dyn Fn(usize) + Sync)) -> Result<Summary> {
     let scene = Scene::named(&options.scene)?;
-    options.check(&scene)?;
+    options.check()?;
     files::write(&scene, options, out, progress)
 }

@@ -58,6 +58,9 @@ fn wrong_usage_exits_with_2() {
     fails(here.path(), &["train", "d", "--out", "r", "--background", "pink"], 2, &["pink", "0.5,0.5,0.5"]);
     fails(here.path(), &["train", "d", "--out", "r", "--seconds", "-1"], 2, &["--seconds"]);
     fails(here.path(), &["train", "d", "--out", "r", "--hold-out", "1"], 2, &["from 2 on, or none"]);
+    fails(here.path(), &["train", "d", "--out", "r", "--crop", "1,2"], 2, &["left, top, right and bottom"]);
+    fails(here.path(), &["eval", "r", "d", "--downscale", "0"], 2, &["--downscale"]);
+    fails(here.path(), &["report", "r", "--alpha", "some"], 2, &["premultiplied"]);
     fails(here.path(), &["render", "r", "--out", "o"], 2, &["--cameras", "--orbit"]);
     fails(here.path(), &["render", "r", "--out", "o", "--orbit", "3", "--frames", "2"], 2, &["A..B"]);
     fails(here.path(), &["render", "r", "--out", "o", "--orbit", "3", "--format", "gif"], 2, &["png"]);
@@ -143,7 +146,7 @@ fn files_that_are_no_checkpoint_are_explained() {
     let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
     bytes.extend(header.as_bytes());
     fs::write(here.path().join("newer"), &bytes).expect("writable");
-    render("newer", &["expected format 1, found 77", "another version"]);
+    render("newer", &["expected format 2, found 77", "another version"]);
 }
 
 #[test]

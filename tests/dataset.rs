@@ -5,7 +5,7 @@ mod shared;
 use std::path::Path;
 
 use nerf::camera::Lens;
-use nerf::dataset::{Dataset, HoldOut, OpenOptions, read_cameras};
+use nerf::dataset::{AlphaMode, Dataset, HoldOut, OpenOptions, read_cameras};
 use nerf::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use shared::shared;
 
@@ -27,6 +27,7 @@ fn lego() {
     assert_eq!((lego.listed, lego.missing.len(), lego.distinct_cameras()), (135, 0, 1));
     assert_eq!(lego.dialect, "blender");
     assert!(lego.is_cutout && !lego.is_hdr);
+    assert_eq!(lego.reading.alpha, AlphaMode::Straight);
     let names: Vec<_> = lego.train[..3].iter().map(|&i| &lego.frames[i].name).collect();
     assert_eq!(names, ["./train/r_0", "./train/r_1", "./train/r_2"]);
     let camera = &lego.frames[0].camera;
@@ -34,13 +35,16 @@ fn lego() {
     assert!((camera.focal_px.x - 138.888_9).abs() < 1e-3);
     assert!(lego.bounds.center.length() < 0.1, "{:?}", lego.bounds);
     assert!((lego.bounds.half - 1.47).abs() < 0.05 && lego.bounds.cascades == 1);
-    let done = std::sync::atomic::AtomicUsize::new(0);
-    let images = lego
-        .load_images(&lego.test, &|_| {
-            done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        })
-        .expect("decodes");
-    assert_eq!((images.len(), done.into_inner()), (25, 25));
+    let mut images = Vec::new();
+    lego.stream(&lego.test, false, &mut |position, photo| {
+        assert_eq!(position, images.len());
+        assert!(photo.ignored.is_empty() && photo.depth.is_empty());
+        images.push(photo.image);
+        Ok(())
+    })
+    .expect("decodes");
+    assert_eq!(images.len(), 25);
+    assert_eq!(images[3], lego.load(lego.test[3], true).expect("decodes").image);
     assert!(images.iter().all(|image| image.width == 100 && image.has_alpha));
 }
 
@@ -126,7 +130,7 @@ fn mistakes_are_explained() {
         ("{".to_owned(), "line 1 column 1"),
         (document("{}", angle), "frame 0: `file_path` is missing"),
         (document(&frame("images/9.png", POSE, ""), angle), "1 of 1 listed images are missing"),
-        (document(&frame("transforms.json", POSE, ""), angle), "expected PNG, JPEG or OpenEXR"),
+        (document(&frame("transforms.json", POSE, ""), angle), "expected PNG, JPEG, WebP"),
     ];
     for (text, expected) in cases {
         let message = format!("{:#}", open_text(text.as_bytes()).expect_err(expected));
@@ -185,7 +189,7 @@ fn dynamic_ranges_do_not_mix() {
     let hdr = write(&["images/1"]).expect("valid");
     assert!(hdr.is_hdr && hdr.is_cutout);
     let mixed = write(&["images/0", "images/1"]).expect_err("mixed");
-    assert!(format!("{mixed:#}").contains("expected all images in OpenEXR or none"));
+    assert!(format!("{mixed:#}").contains("expected all images in a linear format"));
 }
 
 #[test]

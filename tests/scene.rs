@@ -1,7 +1,8 @@
 //! The generated datasets against what geometry says about them.
 
 use glam::{DMat3, DVec3, dvec3};
-use nerf::camera::{Camera, Lens, Ray};
+use nerf::camera::{Camera, Lens, LensKind, Ray};
+use nerf::dataset::{Dataset, OpenOptions};
 use nerf::scene::{Generate, Hit, Scene, Views, generate, names};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -178,7 +179,7 @@ fn all_of_toys_is_within_its_radius() {
 #[test]
 fn captures_carry_their_intrinsics() {
     let folder = tempfile::tempdir().expect("a folder");
-    let options = Generate { lens: true, ..small("courtyard") };
+    let options = Generate { lenses: vec![LensKind::OpenCv], ..small("courtyard") };
     generate(&options, folder.path(), &|_| ()).expect("generated");
     let listing = listing(folder.path(), "test");
     assert_eq!(listing["camera_model"], "OPENCV");
@@ -208,6 +209,37 @@ fn captures_carry_their_intrinsics() {
     });
     let share = agreeing.count() as f64 / depth.len() as f64;
     assert!(share > 0.75, "only {share} of the pixels away from edges agree");
+}
+
+/// Every frame's camera, read back from the files, sees what the files show.
+#[test]
+fn every_lens_is_written_and_read_back() {
+    let kinds = LensKind::ALL.into_iter().map(|kind| vec![kind]).chain([LensKind::ALL.to_vec()]);
+    for (lenses, name) in kinds.flat_map(|lenses| [(lenses.clone(), "courtyard"), (lenses, "toys")]) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let views = Views { train: 5, val: 1, test: 1 };
+        let options = Generate { lenses: lenses.clone(), views, size: (48, 24), ..Generate::new(name) };
+        generate(&options, folder.path(), &|_| ()).expect("generated");
+        let dataset = Dataset::open(folder.path(), &OpenOptions::default()).expect("a dataset");
+        let scene = Scene::named(name).expect("a known scene");
+        for (number, &index) in dataset.train.iter().enumerate() {
+            let camera = &dataset.frames[index].camera;
+            assert_eq!(camera.lens.kind(), lenses[number % lenses.len()], "{name} {lenses:?}");
+            let depth = &planes(&folder.path().join(format!("train/{number:04}_depth.exr")))["Z"];
+            let agrees = |i: usize| {
+                let pixel = glam::dvec2((i % 48) as f64 + 0.5, (i / 48) as f64 + 0.5);
+                let Some(Ray { origin, direction }) = camera.ray(pixel) else { return depth[i] == 0.0 };
+                let hit = scene.trace(origin, direction);
+                if hit.alpha == 0.0 {
+                    return depth[i] == 0.0;
+                }
+                let seen = camera.project(origin + hit.t * direction).map_or(f64::NAN, |(_, depth)| depth);
+                (seen - f64::from(depth[i])).abs() < 0.03 * seen
+            };
+            let share = (0..depth.len()).filter(|&i| agrees(i)).count() as f64 / depth.len() as f64;
+            assert!(share > 0.7, "{name} {lenses:?} frame {number}: only {share} of the pixels agree");
+        }
+    }
 }
 
 #[test]
@@ -241,7 +273,7 @@ fn mistakes_are_explained() {
     };
     let fresh = folder.path().join("new");
     assert!(fails(&small("toy"), &fresh).contains("toys, courtyard, fog"));
-    assert!(fails(&Generate { lens: true, ..small("toys") }, &fresh).contains("courtyard"));
+    assert!(fails(&Generate { lenses: vec![], ..small("toys") }, &fresh).contains("at least one"));
     assert!(fails(&Generate { size: (0, 9), ..small("toys") }, &fresh).contains("0x9"));
     assert!(!fresh.exists(), "nothing is created before the options are checked");
     fs::write(folder.path().join("notes.txt"), "mine").expect("written");

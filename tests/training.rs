@@ -238,19 +238,25 @@ fn held_out_views_stay_held_out() {
     nerf(&elsewhere).assert().code(1).stderr(contains("resume with"));
 }
 
-/// A linear field, lens distortion, cascades: a few steps and a view of each.
+/// A linear field, lenses of every kind, cascades: a few steps and a view of each.
 #[test]
 fn every_kind_of_scene_trains() {
     let small = ["--views", "6", "--size", "24x16", "--samples", "1"];
-    for (scene, further) in [("courtyard", "--lens"), ("fog", "--hdr")] {
+    use LensKind::{Fisheye, OpenCv, Orthographic, Pinhole};
+    let scenes = [
+        ("courtyard", "--lens", vec![OpenCv]),
+        ("fog", "--hdr", vec![Pinhole]),
+        // Four views to train on.
+        ("toys", "--lens=mixed", vec![Pinhole, OpenCv, Fisheye, Orthographic]),
+    ];
+    for (scene, further, lenses) in scenes {
         let dataset = generated(scene, scene, &[&small[..], &[further]].concat());
         let (run, out) = (folder(&format!("{scene}_run")), folder(&format!("{scene}_views")));
         let result = train(&dataset, &run, &["--steps", "24"]);
         assert!(number(&result["psnr"]) > 4.0, "{scene}: {result}");
         let about = checkpoint(&run).about;
-        let lens = if scene == "courtyard" { LensKind::OpenCv } else { LensKind::Pinhole };
-        assert_eq!((about.needs.lenses, about.needs.hdr), ([lens].into(), scene == "fog"));
-        assert!(scene == "fog" || about.needs.cascades > 1);
+        assert_eq!(about.needs.lenses, lenses.into_iter().collect());
+        assert_eq!((about.needs.hdr, about.needs.cascades > 1), (scene == "fog", scene == "courtyard"));
         let cameras = dataset.join("transforms_test.json");
         let args = ["render", text(&run), "--out", text(&out), "--cameras", text(&cameras)];
         nerf(&[&args[..], &["--format", "png", "--format", "exr", "--background", "white"]].concat())

@@ -241,7 +241,11 @@ impl Run {
         let mut clock = Instant::now();
         let mut lap = || std::mem::replace(&mut clock, Instant::now()).elapsed().as_secs_f64();
         let dataset = Dataset::open(dataset, &OpenOptions::default())?;
-        let images = dataset.load_images(&dataset.train, &|_| {})?;
+        let mut images = Vec::with_capacity(dataset.train.len());
+        dataset.stream(&dataset.train, false, &mut |_, photo| {
+            images.push(photo.image);
+            Ok(())
+        })?;
         start.dataset_seconds = lap();
         let gpu = Arc::new(Gpu::open(&adapter::choose(args.adapter.as_deref())?)?);
         start.device_seconds = lap();

@@ -14,6 +14,13 @@ pub(super) fn direction(plane: DVec2) -> Option<DVec3> {
     on_sphere.then(|| DVec3::new(cos_latitude * sin_longitude, sin_latitude, -cos_latitude * cos_longitude))
 }
 
+/// Longitudes are stretched towards the poles. See [`super::Lens::stretch`].
+pub(super) fn stretch(plane: DVec2, spread: f64) -> Option<f64> {
+    let stretch = (plane.y.abs() + spread).cos().recip();
+    let wraps = plane.x.abs() + spread * stretch >= PI;
+    (plane.y.abs() + spread < FRAC_PI_2 && !wraps).then_some(stretch)
+}
+
 /// Where a point other than the origin is imaged.
 pub(super) fn image(point: DVec3) -> DVec2 {
     DVec2::new(point.x.atan2(-point.z), -point.y.atan2(point.x.hypot(point.z)))

@@ -22,6 +22,22 @@ pub(super) fn image(k: &[f64; 4], point: DVec3) -> Option<DVec2> {
     is_within_rim(k, theta).then(|| radius(k, theta) * around)
 }
 
+/// Along the radius the image moves by the slope of θ_d, around the axis by `θ_d / sin θ`. See
+/// [`super::Lens::stretch`].
+pub(super) fn stretch(k: &[f64; 4], point: DVec3, spread: f64) -> Option<f64> {
+    /// Angles between which both vary little, and how much more they may be in between.
+    const ANGLES: u32 = 8;
+    const BETWEEN: f64 = 1.1;
+    let theta = point.x.hypot(point.y).atan2(-point.z);
+    let (low, high) = ((theta - spread).max(0.0), theta + spread);
+    if high >= PI || !is_within_rim(k, high) {
+        return None;
+    }
+    let angles = (0..=ANGLES).map(|step| low + (high - low) * f64::from(step) / f64::from(ANGLES));
+    let around = |theta: f64| if theta > 0.0 { radius(k, theta) / theta.sin() } else { 1.0 };
+    Some(BETWEEN * angles.map(|theta| slope(k, theta).max(around(theta))).fold(0.0, f64::max))
+}
+
 /// See [`super::Lens::rim`].
 pub(super) fn rim(k: &[f64; 4]) -> f64 {
     first_root(&slope_of_square(k), PI * PI).map_or(PI, f64::sqrt)

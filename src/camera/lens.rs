@@ -123,6 +123,17 @@ impl Lens {
         }
     }
 
+    /// The most that the image of a direction moves on the plane per radian that the direction turns, anywhere within
+    /// the angle `spread` of `point`, which is imaged at `plane`. `None` at the rim, where the image wraps around, and
+    /// for lenses whose image is not one of angles.
+    pub(super) fn stretch(&self, plane: DVec2, point: DVec3, spread: f64) -> Option<f64> {
+        match self {
+            Self::Fisheye { k } => fisheye::stretch(k, point, spread),
+            Self::Equirectangular => equirectangular::stretch(plane, spread),
+            Self::Pinhole | Self::OpenCv { .. } | Self::Orthographic => None,
+        }
+    }
+
     /// The ray that is imaged at `plane`, or `None` where the lens images none.
     pub(super) fn ray(&self, plane: DVec2) -> Option<LensRay> {
         let flat = |at: DVec2| DVec3::new(at.x, -at.y, -1.0);

@@ -1,5 +1,6 @@
 //! What `nerf info` takes.
 
+use super::reading::Reading;
 use clap::Args;
 use nerf::dataset::HoldOut;
 use std::path::PathBuf;
@@ -18,6 +19,9 @@ pub(crate) struct Info {
     /// Without a test split, keep every N-th frame for testing, or none
     #[arg(long, value_name = "N|none", default_value = "8", value_parser = super::hold_out)]
     pub(crate) hold_out: HoldOut,
+    /// How photos are read.
+    #[command(flatten)]
+    pub(crate) reading: Reading,
 }
 
 fn picture(text: &str) -> Result<PathBuf, String> {

@@ -2,18 +2,18 @@
 
 use super::field::Field;
 use super::scores::{Compared, Judge, Means, Score};
-use super::{Session, find_frames, writable_folder};
+use super::{Session, find_frames, open_to_compare, writable_folder};
 use crate::cli::Eval;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
-use nerf::dataset::{Dataset, OpenOptions, Split};
+use nerf::dataset::{Dataset, Split};
 use nerf::image::write_png_rgba8;
 use nerf::picture::{ColorSpace, opaque_srgb8};
 use serde_json::{Value, json};
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     let field = Field::load(&args.run, session)?;
-    let dataset = Dataset::open(&args.dataset, &OpenOptions::default())?;
+    let dataset = open_to_compare(&args.dataset, &args.reading, &field.about)?;
     let indices = frames(&field, &dataset, args.split.split(), session)?;
     ensure!(
         dataset.is_hdr == field.about.needs.hdr,
@@ -86,7 +86,7 @@ fn frames(field: &Field, dataset: &Dataset, split: Split, session: &Session<'_>)
 }
 
 fn range(hdr: bool) -> &'static str {
-    if hdr { "linear OpenEXR" } else { "8-bit" }
+    if hdr { "linear" } else { "display-referred" }
 }
 
 fn report(args: &Eval, field: &Field, scores: &[Score], means: Means) -> Value {
@@ -103,8 +103,10 @@ fn report(args: &Eval, field: &Field, scores: &[Score], means: Means) -> Value {
 }
 
 fn describe(args: &Eval, scores: &[Score], means: Means, color_space: ColorSpace) -> String {
-    let mut lines: Vec<_> =
-        scores.iter().map(|s| format!("{}  {:.3} dB  SSIM {:.4}", s.file, s.psnr, s.ssim)).collect();
+    let mut lines: Vec<_> = scores
+        .iter()
+        .map(|s| format!("{}  {:.3} dB  SSIM {:.4}{}", s.file, s.psnr, s.ssim, s.remark()))
+        .collect();
     let encoding = if color_space == ColorSpace::Linear { ", sRGB-encoded and clamped" } else { "" };
     lines.push(format!(
         "mean of {} {} views over {}{encoding}: {:.3} dB  SSIM {:.4}",

@@ -4,9 +4,8 @@ use super::scores::{Judge, Means, Score};
 use super::train::setup::Setup;
 use crate::remarks::Remarks;
 use anyhow::Result;
-use nerf::dataset::Dataset;
+use nerf::dataset::{Dataset, Photo};
 use nerf::gpu::Gpu;
-use nerf::image::Image;
 use nerf::kernels::Workspace;
 use nerf::picture::ColorSpace;
 use nerf::render::Renderer;
@@ -20,7 +19,7 @@ pub(super) struct Exam<'a> {
     /// All test frames.
     pub(super) test: Vec<usize>,
     /// Some of them, evenly spaced, with their photos.
-    few: Vec<(usize, Image)>,
+    few: Vec<(usize, Photo)>,
 }
 
 /// The scores of all test views, and of the few among them.
@@ -50,16 +49,22 @@ impl<'a> Exam<'a> {
         let judge = Judge { renderer, color_space, background: [0.0; 3], dataset };
         let count = setup.test.len().min(few);
         let few: Vec<_> = (0..count).map(|i| setup.test[i * setup.test.len() / count]).collect();
-        let images = dataset.load_images(&few, &|_| {})?;
-        let few = few.into_iter().zip(images).collect();
+        let mut photos = Vec::with_capacity(few.len());
+        dataset.stream(&few, false, &mut |position, photo| {
+            if !photo.is_ignored() {
+                photos.push((few[position], photo));
+            }
+            Ok(())
+        })?;
+        let few = photos;
         Ok(Some(Self { judge, test: setup.test.clone(), few }))
     }
 
     /// Measures the few; `None` if there are none.
     pub(super) fn few(&mut self) -> Result<Option<Means>> {
         let mut scores = Vec::with_capacity(self.few.len());
-        for (index, image) in &self.few {
-            scores.push(self.judge.compare(*index, image)?.score);
+        for (index, photo) in &self.few {
+            scores.push(self.judge.compare(*index, photo)?.score);
         }
         Ok(Means::of(&scores))
     }
@@ -71,11 +76,9 @@ impl<'a> Exam<'a> {
             scores.push(compared.score);
             Ok(())
         })?;
-        let is_one_of_few = |index: &usize| self.few.iter().any(|(few, _)| few == index);
-        let few: Vec<Score> = (self.test.iter().zip(&scores))
-            .filter(|(index, _)| is_one_of_few(index))
-            .map(|(_, score)| score.clone())
-            .collect();
+        let frames = &self.judge.dataset.frames;
+        let is_one_of_few = |score: &&Score| self.few.iter().any(|&(few, _)| frames[few].name == score.file);
+        let few: Vec<Score> = scores.iter().filter(is_one_of_few).cloned().collect();
         Ok(Means::of(&scores).map(|all| Marks { all, few: Means::of(&few) }))
     }
 }

@@ -1,7 +1,7 @@
 //! `nerf generate`: an analytic scene as a dataset.
 
 use super::Session;
-use crate::cli::Generate;
+use crate::cli::generate::Generate;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
 use nerf::scene::{self, Views};
@@ -17,7 +17,7 @@ pub(super) fn run(args: &Generate, session: &Session<'_>) -> Result<()> {
         views: Views::of_total(args.views).context("--views")?,
         size: args.size,
         hdr: args.hdr,
-        lens: args.lens,
+        lenses: args.lens.kinds(),
         samples: args.samples,
         seed: args.seed,
         ..scene::Generate::new(name)

@@ -5,12 +5,12 @@ mod page;
 mod problems;
 mod result;
 
-use super::{Failed, Session, needs};
+use super::{Failed, Session};
 use crate::cli::info::Info;
 use crate::progress::Progress;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use memory::Estimate;
-use nerf::dataset::{Dataset, OpenOptions};
+use nerf::dataset::{Dataset, OpenOptions, Reading};
 use nerf::file::write_atomically;
 use nerf::health::map::{self, Drawing};
 use nerf::health::photos::{Gallery, Look};
@@ -35,14 +35,16 @@ struct Report<'a> {
     gallery: Option<Gallery>,
     /// `None` where there is nothing to train on.
     memory: Option<Estimate>,
-    /// The parts of the program that stay out.
-    left_out: Vec<String>,
     /// Worst first.
     problems: Vec<Finding>,
 }
 
 pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
-    let options = OpenOptions { hold_out: args.hold_out, allow_missing: true, ..OpenOptions::default() };
+    let options = OpenOptions {
+        hold_out: args.hold_out,
+        allow_missing: true,
+        reading: args.reading.over(Reading::default()),
+    };
     let dataset = match Dataset::open(&args.dataset, &options) {
         Ok(dataset) => dataset,
         Err(error) => return unreadable(args, &format!("{error:#}"), session),
@@ -79,9 +81,7 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
         problems.extend(estimate.problems());
         memory = Some(estimate);
     }
-    let background = nerf::config::Config::default().background;
-    let left_out = needs::left_out(&needs::of(dataset), background, dataset);
-    Ok(Report { args, dataset, survey, gallery, memory, left_out, problems })
+    Ok(Report { args, dataset, survey, gallery, memory, problems })
 }
 
 /// Decodes all photos, in parallel, and keeps what matters of each.
@@ -90,7 +90,7 @@ fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, 
     let done = AtomicUsize::new(0);
     let looks: Vec<_> = (views.par_iter())
         .map(|&index| {
-            let look = photo(dataset, index).map(|photo| (index, Look::of(&photo)));
+            let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
             progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
             look.map_err(|error| Finding::error(format!("{error:#}")).about(vec![index]))
         })
@@ -98,11 +98,6 @@ fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, 
     let (looks, failures): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);
     let looks = looks.into_iter().filter_map(Result::ok).collect();
     (Gallery { looks }, failures.into_iter().filter_map(Result::err).collect())
-}
-
-fn photo(dataset: &Dataset, index: usize) -> Result<nerf::dataset::Photo> {
-    let mut images = dataset.load_images(&[index], &|_| {})?;
-    Ok(images.pop().context("there is one image per index")?.into())
 }
 
 fn plot(path: &Path, drawing: &Drawing) -> Result<()> {

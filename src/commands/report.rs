@@ -2,13 +2,13 @@
 
 use super::field::Field;
 use super::scores::Judge;
-use super::{Session, find_frames};
+use super::{Session, find_frames, open_to_compare};
 use crate::cli::Report as Args;
 use crate::remarks::Remarks;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
 use nerf::checkpoint::{self, About};
-use nerf::dataset::{Dataset, OpenOptions};
+use nerf::dataset::Dataset;
 use nerf::file::write_atomically;
 use nerf::report::log::Log;
 use nerf::report::pictures::{Pair, Pictures};
@@ -124,7 +124,7 @@ fn views(args: &Args, field: &Field, session: &Session<'_>) -> Result<Result<Tes
         return Ok(Err("The training held out no test views.".to_owned()));
     }
     let path = args.dataset.clone().unwrap_or_else(|| PathBuf::from(&field.about.dataset));
-    let (dataset, indices, missing) = match open(&path, field) {
+    let (dataset, indices, missing) = match open(&path, args, field) {
         Ok(found) => found,
         Err(error) if args.dataset.is_none() => {
             return Ok(Err(format!(
@@ -149,12 +149,12 @@ fn views(args: &Args, field: &Field, session: &Session<'_>) -> Result<Result<Tes
 }
 
 /// The dataset, its test views as the training had them, and the names of those that it lacks.
-fn open(path: &Path, field: &Field) -> Result<(Dataset, Vec<usize>, Vec<String>)> {
-    let dataset = Dataset::open(path, &OpenOptions::default())?;
+fn open(path: &Path, args: &Args, field: &Field) -> Result<(Dataset, Vec<usize>, Vec<String>)> {
+    let dataset = open_to_compare(path, &args.reading, &field.about)?;
     let show = path.display();
     ensure!(
         dataset.is_hdr == field.about.needs.hdr,
-        "{show} has images of another kind (8-bit or linear OpenEXR) than the training"
+        "{show} has images of another kind (display-referred or linear) than the training"
     );
     let (indices, missing) = find_frames(&dataset, &field.about.splits.test);
     let missing = missing.into_iter().map(str::to_owned).collect();

@@ -3,9 +3,8 @@
 use crate::progress::Progress;
 use crate::remarks::Remarks;
 use anyhow::Result;
-use nerf::dataset::Dataset;
-use nerf::image::Image;
-use nerf::metrics::{psnr, ssim};
+use nerf::dataset::{Dataset, Photo};
+use nerf::metrics::{filled, psnr_where, ssim};
 use nerf::picture::{ColorSpace, photo_over};
 use nerf::render::Renderer;
 use serde::Serialize;
@@ -15,13 +14,23 @@ use serde::Serialize;
 pub(super) struct Score {
     /// The frame's name.
     pub(super) file: String,
-    /// In decibels, over all pixels and channels.
+    /// In decibels, over all channels of the pixels that no mask ignores.
     pub(super) psnr: f64,
     /// Structural similarity.
     pub(super) ssim: f64,
+    /// Number of pixels that masks ignore, if there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) ignored: Option<usize>,
     /// The file the rendering was saved to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) saved: Option<String>,
+}
+
+impl Score {
+    /// What is to be said of the number of pixels, if it is not the whole photo.
+    pub(super) fn remark(&self) -> String {
+        self.ignored.map_or(String::new(), |count| format!("  without {count} masked pixels"))
+    }
 }
 
 /// Means over views.
@@ -71,20 +80,21 @@ pub(super) struct Compared {
 }
 
 impl Judge<'_> {
-    /// Renders frame `index`, whose photo is `image`, and compares.
-    pub(super) fn compare(&mut self, index: usize, image: &Image) -> Result<Compared> {
+    /// Renders frame `index` and compares it with its photo, where the photo's pixels count.
+    pub(super) fn compare(&mut self, index: usize, photo: &Photo) -> Result<Compared> {
         let frame = &self.dataset.frames[index];
         let view = self.renderer.render(&frame.camera)?;
         let rendered = self.color_space.over(&view.color, self.background);
-        let photo = photo_over(image, self.background);
+        let target = photo_over(&photo.image, self.background);
         let (width, height) = (view.width as usize, view.height as usize);
         let score = Score {
             file: frame.name.clone(),
-            psnr: psnr(&rendered, &photo),
-            ssim: ssim(&rendered, &photo, width, height),
+            psnr: psnr_where(&rendered, &target, &photo.ignored),
+            ssim: ssim(&filled(&rendered, &target, &photo.ignored), &target, width, height),
+            ignored: Some(photo.count_ignored()).filter(|&count| count > 0),
             saved: None,
         };
-        Ok(Compared { score, size: [view.width, view.height], rendered, photo })
+        Ok(Compared { score, size: [view.width, view.height], rendered, photo: target })
     }
 
     /// Renders frames one after the other, whose photos are decoded for it, and hands over what it compared.
@@ -95,11 +105,17 @@ impl Judge<'_> {
         mut take: impl FnMut(Compared) -> Result<()>,
     ) -> Result<()> {
         let progress = Progress::new(remarks, "measuring");
-        for (number, &index) in indices.iter().enumerate() {
-            let images = self.dataset.load_images(&[index], &|_| {})?;
-            take(self.compare(index, &images[0])?)?;
-            progress.count(number + 1, indices.len(), "views");
-        }
-        Ok(())
+        let dataset = self.dataset;
+        dataset.stream(indices, false, &mut |position, photo| {
+            let index = indices[position];
+            if photo.is_ignored() {
+                let name = &dataset.frames[index].name;
+                progress.say(&format!("warning: {name} is not measured: its mask ignores every pixel"));
+            } else {
+                take(self.compare(index, &photo)?)?;
+            }
+            progress.count(position + 1, indices.len(), "views");
+            Ok(())
+        })
     }
 }

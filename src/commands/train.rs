@@ -3,14 +3,16 @@
 mod course;
 mod folder;
 mod log;
+pub(super) mod needs;
 pub(super) mod pace;
+pub(super) mod photos;
 pub(super) mod setup;
 pub(super) mod stages;
 
 use super::exam::Exam;
 use super::{Session, report, writable_folder};
 use crate::cli::Train;
-use crate::progress::{Progress, duration};
+use crate::progress::duration;
 use anyhow::Result;
 use course::{Course, End};
 use folder::RunFolder;
@@ -19,7 +21,6 @@ use nerf::dataset::{Dataset, OpenOptions};
 use nerf::report::views::TestViews;
 use nerf::schedule::Budget;
 use nerf::train::Trainer;
-use nerf::views::Views;
 use pace::Pace;
 use serde_json::{Value, json};
 use setup::{Setup, Wishes};
@@ -30,7 +31,9 @@ const FEW_VIEWS: usize = 4;
 
 pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let mut folder = RunFolder::inspect(args)?;
-    let options = OpenOptions { hold_out: args.hold_out, ..OpenOptions::default() };
+    let earlier = folder.checkpoint.as_ref().map(|checkpoint| checkpoint.about.reading.clone());
+    let reading = args.reading.over(earlier.unwrap_or_default());
+    let options = OpenOptions { hold_out: args.hold_out, reading, ..OpenOptions::default() };
     let dataset = Dataset::open(&args.dataset, &options)?;
     session.remarks.notes(&dataset);
     let gpu = session.open_gpu()?;
@@ -44,20 +47,12 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         budget: Budget { steps: args.steps, seconds: args.seconds },
     };
     let setup = Setup::new(&wishes, &dataset, &gpu, folder.checkpoint.take())?;
-    setup.describe(&dataset, &gpu, session.remarks);
+    setup.describe(&gpu, session.remarks);
     writable_folder(&args.out)?;
     let clock = Instant::now();
-    let images = {
-        let progress = Progress::new(session.remarks, "loading");
-        let count = setup.train.len();
-        dataset.load_images(&setup.train, &|done| progress.count(done, count, "images"))?
-    };
+    let views = photos::load(&setup, &dataset, &gpu, session.remarks)?;
     let load_seconds = clock.elapsed().as_secs_f64();
     let clock = Instant::now();
-    let mut views = Views::new(&gpu, &setup.plan, &setup.cameras, &setup.about.bounds)?;
-    for image in images {
-        views.add(&image.into())?;
-    }
     let mut trainer = Trainer::new(&gpu, setup.plan.clone(), views)?;
     trainer.warm_up()?;
     if let Some(state) = &setup.state {
@@ -75,7 +70,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         "step": setup.about.step,
         "adapter": setup.about.adapter,
         "driver": format!("{} {}", gpu.info.driver, gpu.info.driver_info),
-        "left_out": setup.left_out(&dataset),
+        "left_out": needs::left_out(&setup.plan.needs, &setup.about.config),
         "load_seconds": load_seconds,
         "compile_seconds": compile_seconds,
     }))?;

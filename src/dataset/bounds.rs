@@ -163,8 +163,8 @@ impl Bounds {
 /// Half the width of the typical view at the focus, in world units.
 fn footprint(axes: &[Axis], focus: &Focus) -> f64 {
     match focus.kind {
-        FocusKind::Inside => median(axes.iter().map(|axis| focus.distance * axis.tan_half)),
-        _ => median((axes.iter()).map(|axis| axis.origin.distance(focus.point) * axis.tan_half)),
+        FocusKind::Inside => median(axes.iter().map(|axis| axis.half_width_at(focus.distance))),
+        _ => median((axes.iter()).map(|axis| axis.half_width_at(axis.origin.distance(focus.point)))),
     }
 }
 
@@ -240,6 +240,27 @@ mod tests {
             let unseen = choose(&cameras, None, Surroundings::Unknown).0;
             assert_eq!(unseen, bounds);
         }
+    }
+
+    #[test]
+    fn other_lenses_fill_the_box_too() {
+        let with = |lens: Lens, focal_px: f64| {
+            let cameras = ring(DVec3::ONE, 4.0, 0.8).into_iter();
+            let cameras: Vec<_> =
+                cameras.map(|camera| Camera { lens, focal_px: DVec2::splat(focal_px), ..camera }).collect();
+            choose(&cameras, None, Surroundings::Empty).0
+        };
+        // 100 pixels: 2 units to each side at any distance, and half a radian to each side.
+        assert!((with(Lens::Orthographic, 25.0).half - 2.0).abs() < 0.02);
+        assert!((with(Lens::Fisheye { k: [0.0; 4] }, 100.0).half - 4.0 * 0.5f64.tan()).abs() < 0.04);
+        // A whole sphere is seen from a box that reaches to the cameras.
+        assert!((with(Lens::Equirectangular, 100.0 / std::f64::consts::TAU).half - 4.0).abs() < 0.04);
+        // Parallel views side by side overlap at any distance.
+        let place = |i: i32| DVec3::new(f64::from(i), 100.0, 3.0);
+        let parallel = |camera: Camera| Camera { lens: Lens::Orthographic, ..camera };
+        let array: Vec<_> = (-3..=3).map(|i| parallel(looking(place(i), place(i) + DVec3::Y, 0.7))).collect();
+        let (bounds, _) = choose(&array, None, Surroundings::Background);
+        assert!(bounds.center.is_finite() && bounds.half.is_finite() && bounds.half > 0.0, "{bounds:?}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens, LensKind};
 
 /// What matters about a camera here, in world space.
 #[derive(Clone, Copy, Debug)]
@@ -10,19 +10,36 @@ pub(crate) struct Axis {
     pub(crate) origin: DVec3,
     /// Unit direction through the middle of the image.
     pub(crate) direction: DVec3,
+    /// Half the larger side of the view at the camera itself, in world units; 0 but for parallel rays.
+    half_width: f64,
     /// Tangent of half the larger field of view.
-    pub(crate) tan_half: f64,
+    tan_half: f64,
 }
+
+/// A lens that sees more to the side than this is not pointed at all it sees.
+const WIDEST_TANGENT: f64 = 1.0;
 
 impl Axis {
     pub(crate) fn of(camera: &Camera) -> Self {
         let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
         let middle = camera.ray(0.5 * size);
+        let half = (0.5 * size / camera.focal_px).max_element();
+        let is_parallel = camera.lens == Lens::Orthographic;
         Self {
             origin: camera.position(),
             direction: middle.map_or(camera.forward(), |ray| ray.direction),
-            tan_half: (0.5 * size / camera.focal_px).max_element(),
+            half_width: if is_parallel { half } else { 0.0 },
+            tan_half: match camera.lens.kind() {
+                LensKind::Pinhole | LensKind::OpenCv => half,
+                LensKind::Orthographic => 0.0,
+                LensKind::Fisheye | LensKind::Equirectangular => half.min(WIDEST_TANGENT.atan()).tan(),
+            },
         }
+    }
+
+    /// Half the larger side of the view at a distance, in world units.
+    pub(crate) fn half_width_at(&self, distance: f64) -> f64 {
+        self.half_width + distance * self.tan_half
     }
 
     /// Distance along the axis, and away from it.
@@ -34,7 +51,7 @@ impl Axis {
 
     pub(crate) fn sees(&self, point: DVec3) -> bool {
         let (along, across) = self.along_and_across(point);
-        along > 0.0 && across <= self.tan_half * along
+        along > 0.0 && across <= self.half_width_at(along)
     }
 }
 
@@ -142,11 +159,11 @@ fn ahead(axes: &[Axis], mean: DVec3, heading: DVec3) -> Focus {
     let reach = axes.iter().map(away).fold(0.0, f64::max);
     // Where the view of each camera reaches over all the others; a single camera has no such distance,
     // and its distance from the origin is the only length there is.
-    let from_views = 2.0 * reach / median(axes.iter().map(|axis| axis.tan_half));
+    let from_views = median(axes.iter().map(|axis| (2.0 * reach - axis.half_width) / axis.tan_half));
     let lengths = [from_views, mean.length(), 1.0];
     let single = reach <= 1e-9 * mean.length();
     let usable = lengths.into_iter().skip(usize::from(single));
-    let distance = { usable }.find(|&d| d > 0.0).unwrap_or(1.0);
+    let distance = { usable }.find(|&d| d > 0.0 && d.is_finite()).unwrap_or(1.0);
     Focus { point: mean + distance * heading, distance, kind: FocusKind::Ahead }
 }
 

@@ -5,45 +5,51 @@ use std::path::{Path, PathBuf};
 
 use super::notes::{Notes, Severity};
 
-const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "exr", "PNG", "JPG", "JPEG", "EXR"];
+/// Extensions that a listed name may lack, the most common first.
+const EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "exr", "webp", "tif", "tiff", "bmp", "hdr"];
 
 /// Finds the image that `file_path` (forward slashes) means, relative to the folder of the file that
 /// lists it; `owner` names the frame in notes.
 pub(super) fn find(root: &Path, file_path: &str, owner: &str, notes: &mut Notes) -> Option<PathBuf> {
-    let bytes = file_path.as_bytes();
+    let (path, is_by_tail) = locate(root, file_path)?;
+    if is_by_tail {
+        let message =
+            "`file_path` does not lead to a file from here; the image was found by the end of the path";
+        notes.frame(Severity::Note, owner, message);
+    }
+    Some(path)
+}
+
+/// The file that a name in a dataset means, and whether only the end of the name led to it.
+pub(super) fn locate(root: &Path, name: &str) -> Option<(PathBuf, bool)> {
+    let bytes = name.as_bytes();
     let has_drive = bytes.len() > 2 && bytes[0].is_ascii_alphabetic() && bytes[1] == b':';
-    let is_absolute = file_path.starts_with('/') || has_drive;
-    if let Some(path) = with_extension(&root.join(file_path)) {
-        return Some(path);
+    let is_absolute = name.starts_with('/') || has_drive;
+    let existing = |path: &Path| candidates(path).find(|path| path.is_file());
+    if let Some(path) = existing(&root.join(name)) {
+        return Some((path, false));
     }
     // Paths of another machine, or relative to where some exporter ran, are found again by their tail.
     // A bare name is too little to go by unless the path was absolute.
     let parts: Vec<_> =
-        (file_path.split('/')).filter(|part| !part.is_empty() && *part != "." && *part != "..").collect();
+        (name.split('/')).filter(|part| !part.is_empty() && *part != "." && *part != "..").collect();
     let shortest = if is_absolute { 1 } else { 2 };
-    for length in (shortest..parts.len() + usize::from(!is_absolute)).rev() {
-        let tail = parts[parts.len() - length..].join("/");
-        if let Some(path) = with_extension(&root.join(tail)) {
-            let message =
-                "`file_path` does not lead to a file from here; the image was found by the end of the path";
-            notes.frame(Severity::Note, owner, message);
-            return Some(path);
-        }
-    }
-    None
+    let lengths = (shortest..parts.len() + usize::from(!is_absolute)).rev();
+    let tails = lengths.map(|length| root.join(parts[parts.len() - length..].join("/")));
+    tails.into_iter().find_map(|path| existing(&path)).map(|path| (path, true))
 }
 
-fn with_extension(path: &Path) -> Option<PathBuf> {
-    if path.is_file() {
-        return Some(path.to_owned());
-    }
-    let candidates = EXTENSIONS.iter().map(|extension| {
-        let mut name = path.as_os_str().to_owned();
+/// The path itself, then with every extension that it may lack.
+pub(super) fn candidates(path: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    let extensions = EXTENSIONS.into_iter().map(str::to_owned);
+    let base = path.as_os_str().to_owned();
+    let extended = extensions.chain(EXTENSIONS.into_iter().map(str::to_uppercase)).map(move |extension| {
+        let mut name = base.clone();
         name.push(".");
         name.push(extension);
         PathBuf::from(name)
     });
-    candidates.into_iter().find(|path| path.is_file())
+    std::iter::once(path.to_owned()).chain(extended)
 }
 
 /// Orders names as people count: `r_2` before `r_10`.

@@ -1,26 +1,29 @@
 //! Opening a dataset: find its files, parse them, look for the images, split, and bound the scene.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use rayon::prelude::*;
 
 use super::bounds::{Bounds, Surroundings};
-use super::notes::{Notes, Severity};
+use super::located::{Present, locate};
+use super::notes::Notes;
+use super::photo::How;
+use super::reading::{AlphaMode, Reading};
 use super::transforms::{self, Entry, Listing};
-use super::{Dataset, Frame, HoldOut, OpenOptions, Split, frames, splits};
+use super::{Dataset, Frame, HoldOut, OpenOptions, Split, splits};
 use crate::camera::Camera;
-use crate::image::{Header, Image};
+use crate::image::{BitDepth, Evidence, Multiplied};
 
-/// A listed frame and what was found of it.
-struct Located {
-    entry: Entry,
-    found: Option<(PathBuf, Header)>,
-}
+/// Training images that are looked at to tell what their alpha means.
+const ALPHA_SAMPLES: usize = 4;
 
 impl Dataset {
-    /// Opens a folder or a single .json file without decoding the images.
+    /// Opens a folder or a single .json file; of the images, all headers are read and a few are decoded.
+    ///
+    /// # Errors
+    /// When a file cannot be read or understood, when no listed image is there, or when the images cannot be
+    /// trained on together; messages name the file, or the frame and the key.
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Self> {
         if let HoldOut::Every(every) = options.hold_out {
             ensure!(every >= 2, "cannot hold out one frame in {every}: expected 2 or more, or none at all");
@@ -41,13 +44,21 @@ impl Dataset {
             scene_box = scene_box.or(listing.scene_box);
             located.extend(locate(listing, *split, &root, &mut notes)?);
         }
-        let (listed, missing, located) = keep_present(located, &root, options, &mut notes)?;
-        let is_hdr = check_dynamic_range(&located)?;
-        let (frames, members) = build(located, &mut notes);
+        let present = Present::new(located, &root, options, &mut notes)?;
+        let bit_depth = present.bit_depth(&mut notes)?;
+        let (listed, missing) = (present.listed, present.missing.clone());
+        let (frames, members) = present.build(&root, &options.reading, &mut notes)?;
         let members: Vec<_> = members.iter().map(|(s, path)| (*s, path.as_path())).collect();
-        let splits = splits::assign(&members, options.hold_out, &mut notes);
+        let mut splits = splits::assign(&members, options.hold_out, &mut notes);
+        thin_out(&mut splits.train, options.reading.max_images, &mut notes);
         let used = if splits.train.is_empty() { (0..frames.len()).collect() } else { splits.train.clone() };
-        let surroundings = surroundings(&frames, used[0], missing.len() < listed)?;
+        let has_images = missing.len() < listed;
+        let mut reading = options.reading.clone();
+        reading.alpha = alpha(&frames, &used, bit_depth, &reading, &mut notes)?;
+        let surroundings = match has_images {
+            true => surroundings(&frames[used[0]], How::new(bit_depth, &reading))?,
+            false => Surroundings::Unknown,
+        };
         let cameras: Vec<&Camera> = used.iter().map(|&i| &frames[i].camera).collect();
         let bounds = Bounds::choose(&cameras, scene_box, surroundings, &mut notes);
         Ok(Self {
@@ -59,7 +70,9 @@ impl Dataset {
             test: splits.test,
             listed,
             missing,
-            is_hdr,
+            is_hdr: bit_depth == BitDepth::Float,
+            bit_depth,
+            reading,
             is_cutout: surroundings == Surroundings::Empty,
             notes: notes.finish(),
             bounds,
@@ -67,11 +80,50 @@ impl Dataset {
     }
 }
 
+/// Keeps at most so many frames to train on, evenly spaced.
+fn thin_out(train: &mut Vec<usize>, most: Option<usize>, notes: &mut Notes) {
+    let count = train.len();
+    if let Some(most) = most.filter(|&most| most < count) {
+        *train = (0..most).map(|i| train[i * count / most]).collect();
+        notes.note(format!("{most} of {count} frames are trained on, evenly spaced, as asked"));
+    }
+}
+
+/// What alpha means: as asked, or as a few of the images to train on show.
+fn alpha(
+    frames: &[Frame],
+    used: &[usize],
+    bits: BitDepth,
+    reading: &Reading,
+    notes: &mut Notes,
+) -> Result<AlphaMode> {
+    if reading.alpha != AlphaMode::Auto {
+        return Ok(reading.alpha);
+    }
+    if bits == BitDepth::Float {
+        return Ok(AlphaMode::Premultiplied);
+    }
+    let with_alpha: Vec<_> = used.iter().map(|&index| &frames[index]).filter(|f| f.has_own_alpha).collect();
+    let count = with_alpha.len().min(ALPHA_SAMPLES);
+    let samples: Vec<_> = (0..count).map(|i| with_alpha[i * with_alpha.len() / count]).collect();
+    let how = How { multiplied: Multiplied::Straight, ..How::new(bits, reading) };
+    let look = |frame: &&Frame| Ok(frame.upright(how)?.evidence());
+    let evidence: Vec<Evidence> = samples.par_iter().map(look).collect::<Result<_>>()?;
+    if !evidence.into_iter().fold(Evidence::default(), Evidence::and).is_premultiplied() {
+        return Ok(AlphaMode::Straight);
+    }
+    notes.note(
+        "no colour is above its alpha, though the opaque pixels are bright: the colours are taken for premultiplied \
+         with alpha; if their edges come out too bright, say --alpha straight",
+    );
+    Ok(AlphaMode::Premultiplied)
+}
+
 /// Reads the cameras of a single file, in its order, without looking for images: name and camera. Sizes
 /// come from the file, else `default_size` in pixels.
 pub fn read_cameras(path: &Path, default_size: [u32; 2]) -> Result<Vec<(String, Camera)>> {
     let camera = |entry: Entry| {
-        let size = declared_size(&entry).unwrap_or(default_size);
+        let size = entry.declared_size().unwrap_or(default_size);
         let camera = entry.intrinsics.camera(size, entry.world_from_camera).0;
         (entry.file_path, camera)
     };
@@ -143,132 +195,16 @@ fn read(path: &Path) -> Result<Listing> {
     read().with_context(|| format!("reading {}", path.display()))
 }
 
-/// Looks for the images of one listing, in natural order of their names.
-fn locate(
-    mut listing: Listing,
-    split: Option<Split>,
-    root: &Path,
-    notes: &mut Notes,
-) -> Result<Vec<Located>> {
-    notes.append(listing.notes);
-    if listing.frames.iter().any(|entry| entry.split.is_some()) {
-        listing.frames.retain(|entry| entry.split.is_some());
+impl Entry {
+    /// The size in whole pixels that the file declares.
+    pub(super) fn declared_size(&self) -> Option<[u32; 2]> {
+        let size = self.intrinsics.likely_size()?.round().max(glam::DVec2::ONE);
+        Some([size.x as u32, size.y as u32])
     }
-    listing.frames.sort_by(|a, b| frames::natural_order(&a.file_path, &b.file_path));
-    let mut seen = HashSet::new();
-    let mut paths = Vec::new();
-    for mut entry in listing.frames {
-        entry.split = split.or(entry.split);
-        let path = frames::find(root, &entry.file_path, &entry.label, notes);
-        let identity = path.as_deref().map(canonical);
-        if identity.is_some_and(|identity| !seen.insert(identity)) {
-            let message = "the image is listed more than once; the first entry counts";
-            notes.frame(Severity::Warning, &entry.label, message);
-        } else {
-            paths.push((entry, path));
-        }
-    }
-    let inspect = |(entry, path): (Entry, Option<PathBuf>)| {
-        let header = path.as_deref().map(Header::read).transpose();
-        let header = header.with_context(|| entry.label.clone())?;
-        Ok(Located { entry, found: path.zip(header) })
-    };
-    paths.into_par_iter().map(inspect).collect()
-}
-
-fn canonical(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_owned())
-}
-
-/// Sets missing frames aside: the number listed, the names missing, and the frames to go on with.
-fn keep_present(
-    located: Vec<Located>,
-    root: &Path,
-    options: &OpenOptions,
-    notes: &mut Notes,
-) -> Result<(usize, Vec<String>, Vec<Located>)> {
-    let listed = located.len();
-    let absent = located.iter().filter(|frame| frame.found.is_none());
-    let missing: Vec<String> = absent.map(|frame| frame.entry.file_path.clone()).collect();
-    if missing.is_empty() {
-        return Ok((listed, missing, located));
-    }
-    let first: Vec<_> = missing.iter().take(3).map(String::as_str).collect();
-    let more = if missing.len() > 3 { ", …" } else { "" };
-    let message = format!(
-        "{} of {listed} listed images are missing in {}: {}{more}",
-        missing.len(),
-        root.display(),
-        first.join(", ")
-    );
-    if missing.len() < listed {
-        notes.warn(format!("{message}; they are skipped"));
-        let present = located.into_iter().filter(|frame| frame.found.is_some());
-        return Ok((listed, missing, present.collect()));
-    }
-    ensure!(
-        options.allow_missing,
-        "{message}; put the images where `file_path` says, as PNG, JPEG or OpenEXR"
-    );
-    notes.warn(message);
-    Ok((listed, missing, located))
-}
-
-fn check_dynamic_range(located: &[Located]) -> Result<bool> {
-    let first_of = |hdr: bool| {
-        let mut found = located.iter().filter_map(|frame| frame.found.as_ref());
-        found.find(|(_, header)| header.is_hdr == hdr)
-    };
-    match (first_of(true), first_of(false)) {
-        (Some((hdr, _)), Some((ldr, _))) => bail!(
-            "expected all images in OpenEXR or none, found {} beside {}; convert one kind",
-            hdr.display(),
-            ldr.display()
-        ),
-        (hdr, _) => Ok(hdr.is_some()),
-    }
-}
-
-/// Cameras at the size of their images, and what the splits need to know.
-fn build(located: Vec<Located>, notes: &mut Notes) -> (Vec<Frame>, Vec<(Option<Split>, PathBuf)>) {
-    let mut members = Vec::new();
-    let mut frames = Vec::new();
-    for Located { entry, found } in located {
-        let (path, size, has_alpha) = match found {
-            Some((path, header)) => (path, [header.width, header.height], header.has_alpha),
-            None => {
-                let path = PathBuf::from(&entry.file_path);
-                let size = declared_size(&entry).unwrap_or_else(|| {
-                    let message = "neither an image nor `w` and `h` tell the size; 800x800 is assumed";
-                    notes.frame(Severity::Warning, &entry.label, message);
-                    [800, 800]
-                });
-                (path, size, false)
-            }
-        };
-        let (camera, remarks) = entry.intrinsics.camera(size, entry.world_from_camera);
-        for remark in remarks {
-            notes.frame(remark.severity, &entry.label, remark.message);
-        }
-        members.push((entry.split, canonical(&path)));
-        frames.push(Frame { name: entry.file_path, path, camera, has_alpha });
-    }
-    (frames, members)
-}
-
-fn declared_size(entry: &Entry) -> Option<[u32; 2]> {
-    let size = entry.intrinsics.likely_size()?.round().max(glam::DVec2::ONE);
-    Some([size.x as u32, size.y as u32])
 }
 
 /// An alpha channel alone says little (screenshots have one), so the first image is looked at.
-fn surroundings(frames: &[Frame], first: usize, has_images: bool) -> Result<Surroundings> {
-    let frame = &frames[first];
-    Ok(if !has_images {
-        Surroundings::Unknown
-    } else if frame.has_alpha && Image::load(&frame.path)?.is_cutout() {
-        Surroundings::Empty
-    } else {
-        Surroundings::Background
-    })
+fn surroundings(first: &Frame, how: How) -> Result<Surroundings> {
+    let is_cutout = first.has_alpha && first.upright(how)?.is_cutout();
+    Ok(if is_cutout { Surroundings::Empty } else { Surroundings::Background })
 }

@@ -12,8 +12,9 @@ use serde_json::Value;
 use super::Split;
 use super::intrinsics::{self, Intrinsics, Stated};
 use super::json::{self, Fields, REMEDY, describe, shortened};
-use super::notes::{Note, Notes, Severity};
+use super::notes::{Note, Notes};
 use super::pose::{self, Axes, handedness};
+use super::sidecars::{self, DepthEntry};
 use outline::Section;
 pub use scene_box::SceneBox;
 
@@ -42,6 +43,10 @@ pub struct Entry {
     pub world_from_camera: DAffine3,
     /// The split that the file's own lists put the frame in.
     pub split: Option<Split>,
+    /// Its mask as the file spells it, with forward slashes; black pixels of it are ignored.
+    pub mask_path: Option<String>,
+    /// Its depth file.
+    pub depth: Option<DepthEntry>,
 }
 
 impl Listing {
@@ -130,18 +135,16 @@ impl<'a> File<'a> {
         };
         let fields = Fields(map);
         let file_path = file_path(fields, key)?;
-        if fields.has(&["mask_path"]) {
-            let message = "masks (`mask_path`) are not used; the masked pixels are trained on";
-            notes.frame(Severity::Warning, label, message);
-        }
+        let (mask_path, depth) =
+            sidecars::listed(fields, self.section.around.first().copied().unwrap_or(fields))?;
         let own = stated(fields, label, notes)?;
         let layers: Vec<&Stated> = own.iter().chain(&self.intrinsics).collect();
         let intrinsics = Intrinsics::resolve(&layers, label, notes)?;
         let Some(world_from_camera) = pose::read(fields, self.axes, label, notes)? else {
             return Ok(None);
         };
-        let label = label.to_owned();
-        Ok(Some(Entry { label, intrinsics, world_from_camera, split: self.section.split, file_path }))
+        let (label, split) = (label.to_owned(), self.section.split);
+        Ok(Some(Entry { label, intrinsics, world_from_camera, split, file_path, mask_path, depth }))
     }
 }
 

@@ -65,8 +65,7 @@ impl Look {
         let [brightness, black, white] =
             coarse.opaque_means([|v| v.powf(2.2), |v| f32::from(v < BLACK), |v| f32::from(v > WHITE)]);
         // Linear photos are toned by their own brightness.
-        let brightness =
-            if image.is_hdr() { brightness.and_then(|_| image.brightness()) } else { brightness };
+        let brightness = if image.is_hdr() { brightness.and_then(|_| image.grey()) } else { brightness };
         Self {
             sharpness: has_edges.then(|| fine.laplacian_energy() / edges),
             brightness,

@@ -2,6 +2,7 @@
 
 use super::gaze::Gaze;
 use super::{Finding, Scene, Spread};
+use crate::camera::LensKind;
 use crate::dataset::Dataset;
 use crate::words::{count, length};
 use glam::DVec3;
@@ -118,7 +119,15 @@ fn away(scene: &Scene<'_>, gaze: &Gaze) -> Vec<usize> {
     if !gaze.meets || gaze.seeing < NEARLY_ALL {
         return Vec::new();
     }
-    let is_away = |&view: &usize| gaze.off_rad[view] > TURNED_AWAY * scene.axes[view].tan_half.atan();
+    let cameras: Vec<_> = scene.cameras().collect();
+    let is_away = |&view: &usize| {
+        let axis = &scene.axes[view];
+        let distance = axis.origin.distance(gaze.focus).max(f64::MIN_POSITIVE);
+        let half_view = (axis.half_width_at(distance) / distance).atan();
+        // Lenses that see all around may point anywhere.
+        let points = !matches!(cameras[view].lens.kind(), LensKind::Fisheye | LensKind::Equirectangular);
+        points && gaze.off_rad[view] > TURNED_AWAY * half_view
+    };
     (0..scene.count()).filter(is_away).collect()
 }
 

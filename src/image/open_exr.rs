@@ -5,13 +5,14 @@ use std::io::BufReader;
 use std::path::Path;
 
 use ::exr::meta::MetaData;
+use ::exr::meta::header::Header as Part;
 use ::exr::prelude::{
-    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image as ExrImage, IntegerBounds, Layer,
-    LayerAttributes, ReadChannels, ReadLayers, Vec2, WritableImage, f16, read,
+    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image as ExrImage, Layer, LayerAttributes,
+    ReadChannels, ReadLayers, ReadSpecificChannel, Text, Vec2, WritableImage, f16, read,
 };
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result};
 
-use super::{Header, Image, Pixels, check_count};
+use super::{BitDepth, Header, Image, Pixels, check_count, check_size, of_file};
 use crate::file::write_atomically;
 
 /// What [`write_exr`] stores, each `[height * width]`.
@@ -71,130 +72,183 @@ fn half(value: f32) -> f16 {
 }
 
 /// Reads one channel of an OpenEXR file: width, height and the values, `[height * width]`.
+///
+/// # Errors
+/// When the file cannot be read or lacks the channel.
 pub fn read_exr_channel(path: &Path, name: &str) -> Result<(u32, u32, Vec<f32>)> {
-    let read = || -> Result<_> {
-        let layer = FlatLayer::read(path)?;
-        let Some(values) = layer.channel(name) else {
-            bail!("expected a channel {name}, found {}", layer.names());
-        };
-        Ok((layer.width, layer.height, values))
+    of_file(path, || read_one(path, &[name]))
+}
+
+/// The channel of an OpenEXR file that holds depth.
+pub(super) fn load_depth(path: &Path) -> Result<(u32, u32, Vec<f32>)> {
+    let parts = parts(path)?;
+    let only = match &parts[..] {
+        [part] if part.channels.list.len() == 1 => part.channels.list[0].name.to_string(),
+        _ => String::from("Z"),
     };
-    read().with_context(|| format!("reading {}", path.display()))
+    read_one(path, &["Z", "V", "Y", "R", &only])
+}
+
+/// Width, height and the values of the first of these channels that there is.
+fn read_one(path: &Path, names: &[&str]) -> Result<(u32, u32, Vec<f32>)> {
+    let parts = parts(path)?;
+    let found = names.iter().find_map(|name| find(&parts, &[name]));
+    let Some((part, channels)) = found else {
+        let wanted = names.first().copied().unwrap_or_default();
+        anyhow::bail!("expected a channel {wanted}, found {}", names_of(&parts));
+    };
+    let window = Display::of(part)?;
+    let create = move |_: Vec2<usize>, _: &_| window.canvas(0.0);
+    let set = move |values: &mut Vec<f32>, at: Vec2<usize>, (value,): (f32,)| window.set(values, at, value);
+    let channels = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .specific_channels()
+        .required::<f32>(channels[0].clone())
+        .collect_pixels(create, set);
+    let image = channels.first_valid_layer().all_attributes().non_parallel().from_buffered(reader(path)?)?;
+    Ok((window.size[0], window.size[1], image.layer_data.channel_data.pixels))
 }
 
 pub(super) fn header(path: &Path) -> Result<Header> {
-    let meta = MetaData::read_from_buffered(BufReader::new(File::open(path)?), false)?;
-    let first = meta.headers.first().context("the file has no layer")?;
-    let (width, height) = size(first.shared_attributes.display_window)?;
-    let is_alpha = |name: String| name == "A" || name.ends_with(".A");
-    Ok(Header {
-        width,
-        height,
-        has_alpha: (first.channels.list.iter()).any(|channel| is_alpha(channel.name.to_string())),
-        is_hdr: true,
-    })
+    let parts = parts(path)?;
+    let (part, channels) = color_channels(&parts)?;
+    let [width, height] = Display::of(part)?.size;
+    let has_alpha = part.channels.list.iter().any(|channel| channel.name == channels[3]);
+    Ok(Header { width, height, has_alpha, bits: BitDepth::Float, orientation: None })
 }
 
 pub(super) fn load(path: &Path) -> Result<Image> {
-    let layer = FlatLayer::read(path)?;
-    let grey = layer.channel("Y");
-    let color = |name| {
-        let found = layer.channel(name).or_else(|| grey.clone());
-        found.with_context(|| {
-            format!(
-                "expected the channels R, G and B, found {}; export the beauty pass as RGB",
-                layer.names()
-            )
-        })
+    let parts = parts(path)?;
+    let (part, [red, green, blue, alpha]) = color_channels(&parts)?;
+    let has_alpha = part.channels.list.iter().any(|channel| channel.name == alpha);
+    let window = Display::of(part)?;
+    let outside = [0.0, 0.0, 0.0, if has_alpha { 0.0 } else { 1.0 }];
+    let layers = read().no_deep_data().largest_resolution_level().specific_channels();
+    let file = reader(path)?;
+    // The crate's reader takes every channel once.
+    let pixels = if red == green {
+        let create = move |_: Vec2<usize>, _: &_| window.canvas(outside);
+        let set = move |pixels: &mut Vec<[f32; 4]>, at: Vec2<usize>, (grey, alpha): (f32, f32)| {
+            window.set(pixels, at, repaired([grey, grey, grey, alpha]));
+        };
+        let channels = layers.required::<f32>(red).optional(alpha, 1.0_f32).collect_pixels(create, set);
+        let image = channels.first_valid_layer().all_attributes().non_parallel().from_buffered(file)?;
+        image.layer_data.channel_data.pixels
+    } else {
+        let create = move |_: Vec2<usize>, _: &_| window.canvas(outside);
+        let set = move |pixels: &mut Vec<[f32; 4]>, at: Vec2<usize>, (r, g, b, a): (f32, f32, f32, f32)| {
+            window.set(pixels, at, repaired([r, g, b, a]));
+        };
+        let channels = layers.required::<f32>(red).required::<f32>(green).required::<f32>(blue);
+        let channels = channels.optional(alpha, 1.0_f32).collect_pixels(create, set);
+        let image = channels.first_valid_layer().all_attributes().non_parallel().from_buffered(file)?;
+        image.layer_data.channel_data.pixels
     };
-    let (red, green, blue) = (color("R")?, color("G")?, color("B")?);
-    let alpha = layer.channel("A");
-    let has_alpha = alpha.is_some();
-    let alpha = alpha.unwrap_or_else(|| vec![1.0; red.len()]);
-    let pixels = (0..red.len())
-        .map(|i| {
-            let [r, g, b] = [red[i], green[i], blue[i]].map(finite);
-            [r, g, b, finite(alpha[i]).clamp(0.0, 1.0)]
-        })
-        .collect();
-    Ok(Image { width: layer.width, height: layer.height, pixels: Pixels::Linear(pixels), has_alpha })
+    let [width, height] = window.size;
+    Ok(Image { width, height, pixels: Pixels::Linear(pixels), has_alpha })
+}
+
+fn repaired([r, g, b, alpha]: [f32; 4]) -> [f32; 4] {
+    [finite(r), finite(g), finite(b), finite(alpha).clamp(0.0, 1.0)]
 }
 
 /// Path tracers leave single infinite or undefined pixels, which would spoil a whole training run:
 /// undefined becomes black, infinite the largest half.
-fn finite(value: f32) -> f32 {
+pub(super) fn finite(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(-65504.0, 65504.0) }
 }
 
-fn size(window: IntegerBounds) -> Result<(u32, u32)> {
-    let (width, height) = (window.size.0, window.size.1);
-    ensure!(
-        (1..=1 << 16).contains(&width) && (1..=1 << 16).contains(&height),
-        "expected an image of 1 to 65536 pixels a side, found {width}x{height}"
-    );
-    Ok((width as u32, height as u32))
+fn reader(path: &Path) -> Result<BufReader<File>> {
+    Ok(BufReader::new(File::open(path)?))
 }
 
-/// The first layer of a file, on its display window.
-struct FlatLayer {
-    width: u32,
-    height: u32,
-    /// Where the stored pixels start on the display window.
-    offset: Vec2<i32>,
-    layer: Layer<AnyChannels<FlatSamples>>,
+/// The parts of a file, which the crate calls layers, with sizes that are worth decoding.
+fn parts(path: &Path) -> Result<Vec<Part>> {
+    let parts = MetaData::read_from_buffered(reader(path)?, false)?.headers;
+    for part in &parts {
+        check_size(part.layer_size.0 as u64, part.layer_size.1 as u64)?;
+    }
+    Ok(parts.into_iter().collect())
 }
 
-impl FlatLayer {
-    fn read(path: &Path) -> Result<Self> {
-        // Refuses absurd sizes before memory is asked for them.
-        header(path)?;
-        let image = read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .all_channels()
-            .first_valid_layer()
-            .all_attributes()
-            .from_buffered(BufReader::new(File::open(path)?))?;
-        let window = image.attributes.display_window;
-        let (width, height) = size(window)?;
-        Ok(Self {
-            width,
-            height,
-            offset: image.layer_data.attributes.layer_position - window.position,
-            layer: image.layer_data,
+/// The first part that has all these channels at full resolution, and their names: exact, or as the last part
+/// of a dotted name, all of the same layer.
+fn find<'a>(parts: &'a [Part], names: &[&str]) -> Option<(&'a Part, Vec<Text>)> {
+    let flat = parts.iter().filter(|part| !part.deep);
+    flat.into_iter().find_map(|part| {
+        let full = || part.channels.list.iter().filter(|channel| channel.sampling == Vec2(1, 1));
+        let first = names.first()?;
+        let layer = |name: String| name.strip_suffix(first).map(str::to_owned);
+        let is_layer = |prefix: &String| prefix.is_empty() || prefix.ends_with('.');
+        let mut layers: Vec<_> =
+            full().filter_map(|channel| layer(channel.name.to_string())).filter(is_layer).collect();
+        // The unnamed layer first.
+        layers.sort_by_key(|prefix| !prefix.is_empty());
+        layers.into_iter().find_map(|prefix| {
+            let named = |name: &&str| {
+                let name = format!("{prefix}{name}");
+                full().find(|channel| channel.name.to_string() == name).map(|channel| channel.name.clone())
+            };
+            Some((part, names.iter().map(named).collect::<Option<Vec<_>>>()?))
         })
+    })
+}
+
+/// Red, green, blue and alpha, whether or not there is alpha; grey stands for all three colours.
+fn color_channels(parts: &[Part]) -> Result<(&Part, [Text; 4])> {
+    let color = find(parts, &["R", "G", "B"]).or_else(|| {
+        let (part, grey) = find(parts, &["Y"])?;
+        Some((part, vec![grey[0].clone(); 3]))
+    });
+    let (part, color) = color.with_context(|| {
+        format!(
+            "expected the channels R, G and B, found {}; export the beauty pass as RGB at full resolution",
+            names_of(parts)
+        )
+    })?;
+    let [red, green, blue] = &color[..] else { anyhow::bail!("expected three colours") };
+    let name = red.to_string();
+    let prefix = name.rsplit_once('.').map_or(String::new(), |(layer, _)| format!("{layer}."));
+    let alpha = Text::new_or_none(format!("{prefix}A")).context("a channel's name is not text")?;
+    Ok((part, [red.clone(), green.clone(), blue.clone(), alpha]))
+}
+
+fn names_of(parts: &[Part]) -> String {
+    let channels = parts.iter().flat_map(|part| &part.channels.list);
+    let names: Vec<_> = channels.map(|channel| channel.name.to_string()).collect();
+    names.join(", ")
+}
+
+/// The window to show, and where the stored pixels start on it.
+#[derive(Clone, Copy)]
+struct Display {
+    size: [u32; 2],
+    offset: [i64; 2],
+}
+
+impl Display {
+    fn of(part: &Part) -> Result<Self> {
+        let window = part.shared_attributes.display_window;
+        let (width, height) = (window.size.0 as u64, window.size.1 as u64);
+        check_size(width, height)?;
+        let (stored, shown) = (part.own_attributes.layer_position, window.position);
+        let offset = [(stored.0, shown.0), (stored.1, shown.1)];
+        let offset = offset.map(|(stored, shown)| i64::from(stored) - i64::from(shown));
+        Ok(Self { size: [width as u32, height as u32], offset })
     }
 
-    /// The values of a channel, named exactly or as the last part of a dotted name; 0 where the display
-    /// window has no stored pixels.
-    fn channel(&self, name: &str) -> Option<Vec<f32>> {
-        let list = &self.layer.channel_data.list;
-        let suffix = format!(".{name}");
-        let channel = (list.iter().find(|channel| channel.name.eq(name)))
-            .or_else(|| (list.iter()).find(|c| c.name.to_string().ends_with(&suffix)))?;
-        if channel.sampling != Vec2(1, 1) {
-            return None;
-        }
-        let stored: Vec<f32> = channel.sample_data.values_as_f32().collect();
-        let (width, height) = (self.width as usize, self.height as usize);
-        if self.offset == Vec2(0, 0) && self.layer.size == Vec2(width, height) {
-            return Some(stored);
-        }
-        let mut values = vec![0.0; width * height];
-        for (index, value) in stored.into_iter().enumerate() {
-            let x = (index % self.layer.size.0) as i64 + i64::from(self.offset.0);
-            let y = (index / self.layer.size.0) as i64 + i64::from(self.offset.1);
-            if (0..width as i64).contains(&x) && (0..height as i64).contains(&y) {
-                values[y as usize * width + x as usize] = value;
-            }
-        }
-        Some(values)
+    fn canvas<T: Clone>(self, value: T) -> Vec<T> {
+        vec![value; self.size[0] as usize * self.size[1] as usize]
     }
 
-    fn names(&self) -> String {
-        let channels = self.layer.channel_data.list.iter();
-        let names: Vec<_> = channels.map(|channel| channel.name.to_string()).collect();
-        names.join(", ")
+    /// Sets the pixel that is stored at `at`, unless it lies outside.
+    fn set<T>(self, values: &mut [T], at: Vec2<usize>, value: T) {
+        let (x, y) = (at.0 as i64 + self.offset[0], at.1 as i64 + self.offset[1]);
+        let [width, height] = self.size.map(i64::from);
+        if (0..width).contains(&x) && (0..height).contains(&y) {
+            values[(y * width + x) as usize] = value;
+        }
     }
 }
 
@@ -218,7 +272,7 @@ mod tests {
             let z = read_exr_channel(&path, "Z").expect("has depth");
             assert_eq!(z, (3, 2, depth.to_vec()));
             let header = Header::read(&path).expect("readable");
-            assert!(header.is_hdr && header.has_alpha && header.width == 3);
+            assert!(header.bits == BitDepth::Float && header.has_alpha && header.width == 3);
         }
         let missing = read_exr_channel(&path, "N").expect_err("no such channel");
         assert!(format!("{missing:#}").contains("found A, B, G, R, Z"));

@@ -140,7 +140,6 @@ impl Camera {
             tangential: tangential.map(|p| p as f32),
             lens: lens::number(camera.lens.kind()),
             rim: camera.lens.rim().unwrap_or_default() as f32,
-            ..Self::default()
         }
     }
 }

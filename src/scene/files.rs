@@ -3,7 +3,7 @@
 use super::picture::{Picture, render};
 use super::rig::{ORBIT_FOV_RAD, Split, camera};
 use super::{Generate, Scene, Summary};
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, Lens, LensKind};
 use crate::file::write_atomically;
 use crate::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use anyhow::{Context, Result, bail};
@@ -91,44 +91,46 @@ impl View {
     }
 
     /// Its entry in `transforms_*.json`; `extension` is that of the image, with its dot.
-    fn entry(&self, extension: &str) -> Value {
+    fn entry(&self, extension: &str) -> Map<String, Value> {
         let pose = self.camera.world_from_camera;
         let rows = [0, 1, 2].map(|row| {
             let axes = pose.matrix3.row(row);
             [axes.x, axes.y, axes.z, pose.translation[row]]
         });
-        json!({
-            "file_path": format!("./{}{extension}", self.stem()),
-            "depth_file_path": format!("./{}", self.depth_path()),
-            "transform_matrix": [rows[0], rows[1], rows[2], [0.0, 0.0, 0.0, 1.0]],
-        })
+        Map::from_iter([
+            ("file_path".to_owned(), json!(format!("./{}{extension}", self.stem()))),
+            ("depth_file_path".to_owned(), json!(format!("./{}", self.depth_path()))),
+            ("transform_matrix".to_owned(), json!([rows[0], rows[1], rows[2], [0.0, 0.0, 0.0, 1.0]])),
+        ])
     }
 }
 
 /// The contents of a `transforms_*.json`: in Blender's dialect (`camera_angle_x`, 8-bit images named without
-/// extension) for scenes with alpha, with full intrinsics for captures.
+/// extension) for scenes with alpha seen by pinholes, else with full intrinsics, of every frame where they differ.
 fn listing<'a>(scene: &Scene, options: &Generate, views: impl Iterator<Item = &'a View>) -> Value {
-    let capture = scene.is_opaque();
-    let extension = match (options.hdr, capture) {
+    let is_blender = !scene.is_opaque() && options.lenses.iter().all(|&kind| kind == LensKind::Pinhole);
+    let extension = match (options.hdr, is_blender) {
         (true, _) => ".exr",
-        (false, true) => ".png",
-        (false, false) => "",
+        (false, false) => ".png",
+        (false, true) => "",
     };
+    let is_mixed = options.lenses.len() > 1;
     let mut listing = Map::new();
     let mut frames = Vec::new();
-    let mut first = None;
     for view in views {
-        first = first.or(Some(&view.camera));
-        frames.push(view.entry(extension));
-    }
-    let (width, height) = options.size;
-    match first {
-        Some(camera) if capture => listing.extend(intrinsics(camera)),
-        _ => {
-            listing.insert("camera_angle_x".to_owned(), json!(ORBIT_FOV_RAD));
-            listing.insert("w".to_owned(), json!(width));
-            listing.insert("h".to_owned(), json!(height));
+        let mut entry = view.entry(extension);
+        if is_mixed {
+            entry.extend(intrinsics(&view.camera));
+        } else if listing.is_empty() && !is_blender {
+            listing.extend(intrinsics(&view.camera));
         }
+        frames.push(Value::Object(entry));
+    }
+    if is_blender || frames.is_empty() {
+        let (width, height) = options.size;
+        listing.insert("camera_angle_x".to_owned(), json!(ORBIT_FOV_RAD));
+        listing.insert("w".to_owned(), json!(width));
+        listing.insert("h".to_owned(), json!(height));
     }
     listing.insert("frames".to_owned(), Value::Array(frames));
     Value::Object(listing)
@@ -138,7 +140,13 @@ fn listing<'a>(scene: &Scene, options: &Generate, views: impl Iterator<Item = &'
 fn intrinsics(camera: &Camera) -> Map<String, Value> {
     let mut keys = Map::new();
     let mut put = |name: &str, value: Value| keys.insert(name.to_owned(), value);
-    let model = if camera.lens == Lens::Pinhole { "PINHOLE" } else { "OPENCV" };
+    let (model, coefficients) = match camera.lens {
+        Lens::Pinhole => ("PINHOLE", Vec::new()),
+        Lens::OpenCv { k, p } => ("OPENCV", [&k[..], &p[..]].concat()),
+        Lens::Fisheye { k } => ("OPENCV_FISHEYE", k.to_vec()),
+        Lens::Orthographic => ("ORTHOGRAPHIC", Vec::new()),
+        Lens::Equirectangular => ("EQUIRECTANGULAR", Vec::new()),
+    };
     put("camera_model", json!(model));
     put("w", json!(camera.width));
     put("h", json!(camera.height));
@@ -146,13 +154,8 @@ fn intrinsics(camera: &Camera) -> Map<String, Value> {
     put("fl_y", json!(camera.focal_px.y));
     put("cx", json!(camera.center_px.x));
     put("cy", json!(camera.center_px.y));
-    if let Lens::OpenCv { k, p } = camera.lens {
-        for (name, value) in ["k1", "k2", "k3", "k4"].into_iter().zip(k) {
-            put(name, json!(value));
-        }
-        for (name, value) in ["p1", "p2"].into_iter().zip(p) {
-            put(name, json!(value));
-        }
+    for (name, value) in ["k1", "k2", "k3", "k4", "p1", "p2"].into_iter().zip(coefficients) {
+        put(name, json!(value));
     }
     keys
 }

@@ -11,7 +11,7 @@ pub(super) struct Picture {
     pub linear: Vec<[f32; 4]>,
     /// Straight sRGB colour and alpha, rounded to 8 bits; averaged premultiplied in encoded values.
     pub srgb: Vec<[u8; 4]>,
-    /// Mean distance along the view axis weighted by alpha, 0 where alpha is 0.
+    /// Mean depth (see [`crate::camera::LensKind::depth_is_distance`]) weighted by alpha, 0 where alpha is 0.
     pub depth: Vec<f32>,
 }
 
@@ -50,7 +50,7 @@ struct Pixel {
     /// Premultiplied encoded colour.
     srgb: [f64; 3],
     alpha: f64,
-    /// Alpha times the distance along the view axis.
+    /// Alpha times the depth.
     alpha_depth: f64,
 }
 
@@ -70,7 +70,8 @@ fn pixel(scene: &Scene, camera: &Camera, corner: DVec2, pattern: &[DVec2]) -> Pi
             sum.srgb[channel] += weight * hit.color_srgb[channel];
         }
         sum.alpha += weight;
-        sum.alpha_depth += weight * hit.t * ray.direction.dot(forward);
+        let along = if camera.lens.depth_is_distance() { 1.0 } else { ray.direction.dot(forward) };
+        sum.alpha_depth += weight * hit.t * along;
     }
     sum.alpha = sum.alpha.min(1.0);
     sum

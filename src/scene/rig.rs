@@ -1,7 +1,7 @@
 //! Where the cameras of a generated dataset stand and what their lenses are.
 
 use super::{Generate, Scene};
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, Lens, LensKind};
 use glam::{DAffine3, DMat3, DVec2, DVec3, dvec2, dvec3};
 use std::f64::consts::TAU;
 
@@ -43,44 +43,72 @@ impl Split {
 /// The camera of view `index` of a split.
 pub(super) fn camera(scene: &Scene, options: &Generate, split: Split, index: usize) -> Camera {
     let mut random = Random::new(options.seed, split);
+    let kind = options.lenses[index % options.lenses.len()];
     let (width, height) = options.size;
-    let (w, h) = (f64::from(width), f64::from(height));
-    if scene.is_opaque() {
-        let focal = 0.75 * w.max(h);
-        return Camera {
-            width,
-            height,
-            focal_px: dvec2(focal, 1.004 * focal),
-            center_px: dvec2(0.512 * w, 0.489 * h),
-            lens: lens(options.lens),
-            world_from_camera: handheld(&mut random, index, split.views(options)),
-        };
-    }
+    let size = dvec2(f64::from(width), f64::from(height));
+    let is_capture = scene.is_opaque();
+    let world_from_camera = match is_capture {
+        true => handheld(&mut random, index, split.views(options)),
+        false => orbit(&mut random, index, orbit_radius(kind)),
+    };
+    // A capture's sensor is a little off, but a sphere is always whole.
+    let is_exact = !is_capture || kind == LensKind::Equirectangular;
+    let (stretch, middle) = if is_exact { (1.0, dvec2(0.5, 0.5)) } else { (1.004, dvec2(0.512, 0.489)) };
     Camera {
         width,
         height,
-        focal_px: DVec2::splat(0.5 * w / (0.5 * ORBIT_FOV_RAD).tan()),
-        center_px: dvec2(0.5 * w, 0.5 * h),
-        lens: Lens::Pinhole,
-        world_from_camera: orbit(&mut random, index),
+        focal_px: focal_px(size, is_capture, kind) * dvec2(1.0, stretch),
+        center_px: middle * size,
+        lens: lens(kind),
+        world_from_camera,
     }
 }
 
-/// A wide-angle barrel distortion, invertible over the whole image.
-fn lens(distorted: bool) -> Lens {
-    if distorted { Lens::OpenCv { k: [-0.11, 0.02, 0.0, 0.0], p: [0.0012, -0.0008] } } else { Lens::Pinhole }
+/// Lenses that see more are held closer.
+fn orbit_radius(kind: LensKind) -> f64 {
+    match kind {
+        LensKind::Pinhole | LensKind::OpenCv | LensKind::Orthographic => ORBIT_RADIUS,
+        LensKind::Fisheye => 0.5 * ORBIT_RADIUS,
+        LensKind::Equirectangular => 0.4 * ORBIT_RADIUS,
+    }
+}
+
+/// A fisheye sees 180 degrees along the diagonal of a square image, parallel rays about what a pinhole does.
+fn focal_px(size: DVec2, is_capture: bool, kind: LensKind) -> DVec2 {
+    let longer = size.max_element();
+    match (kind, is_capture) {
+        (LensKind::Pinhole | LensKind::OpenCv, true) => DVec2::splat(0.75 * longer),
+        (LensKind::Pinhole | LensKind::OpenCv, false) => {
+            DVec2::splat(0.5 * size.x / (0.5 * ORBIT_FOV_RAD).tan())
+        }
+        (LensKind::Fisheye, _) => DVec2::splat(longer / 2.2),
+        (LensKind::Orthographic, true) => DVec2::splat(longer / 2.2),
+        (LensKind::Orthographic, false) => DVec2::splat(longer / 2.6),
+        (LensKind::Equirectangular, _) => size / dvec2(TAU, 0.5 * TAU),
+    }
+}
+
+/// Lenses with a moderate distortion, invertible over the whole image.
+fn lens(kind: LensKind) -> Lens {
+    match kind {
+        LensKind::Pinhole => Lens::Pinhole,
+        LensKind::OpenCv => Lens::OpenCv { k: [-0.11, 0.02, 0.0, 0.0], p: [0.0012, -0.0008] },
+        LensKind::Fisheye => Lens::Fisheye { k: [-0.02, 0.003, -0.0004, 0.0] },
+        LensKind::Orthographic => Lens::Orthographic,
+        LensKind::Equirectangular => Lens::Equirectangular,
+    }
 }
 
 /// Evenly spread over the sphere without its poles, looking at the origin: the R2 sequence from a random start,
 /// so that any run of consecutive views is spread too.
-fn orbit(random: &mut Random, index: usize) -> DAffine3 {
+fn orbit(random: &mut Random, index: usize, radius: f64) -> DAffine3 {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     let step = index as f64;
     let angle = TAU * (random.unit() + step / PLASTIC).fract();
     let lift = (random.unit() + step / (PLASTIC * PLASTIC)).fract();
     let up = -0.55 + 1.5 * lift;
     let flat = (1.0 - up * up).sqrt();
-    look_at(ORBIT_RADIUS * dvec3(flat * angle.cos(), flat * angle.sin(), up), DVec3::ZERO, 0.0)
+    look_at(radius * dvec3(flat * angle.cos(), flat * angle.sin(), up), DVec3::ZERO, 0.0)
 }
 
 /// A walk around the middle with a swaying hand: distance, height, aim and roll vary.
@@ -183,7 +211,7 @@ mod tests {
                 assert!(train.iter().all(apart));
             }
         }
-        let eye = |seed| orbit(&mut Random::new(seed, Split::Train), 0).translation;
+        let eye = |seed| orbit(&mut Random::new(seed, Split::Train), 0, ORBIT_RADIUS).translation;
         assert!(eye(0).distance(eye(1)) > 1e-3);
     }
 }

@@ -7,17 +7,16 @@ use super::{circumstances, joined, markdown, optional, quoted, write_csv, write_
 use crate::cli::bench::Training;
 use crate::commands::exam::Exam;
 use crate::commands::train::pace::Pace;
+use crate::commands::train::photos;
 use crate::commands::train::setup::{Setup, Wishes};
 use crate::commands::{Session, writable_folder};
-use crate::progress::{Progress, short};
+use crate::progress::short;
 use anyhow::{Context, Result, ensure};
 use curve::{Curve, follow};
 use nerf::dataset::{Dataset, OpenOptions};
 use nerf::gpu::Gpu;
-use nerf::image::Image;
 use nerf::schedule::Budget;
 use nerf::train::Trainer;
-use nerf::views::Views;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -40,6 +39,8 @@ struct Entry {
 struct Run {
     config: String,
     seed: u32,
+    /// Decoding the photos and putting them on the device.
+    load_seconds: f64,
     /// Building kernels and buffers, and running each kernel once.
     compile_seconds: f64,
     /// Rendering and comparing test views, along the way and at the end.
@@ -54,25 +55,17 @@ struct Run {
 struct Course<'a> {
     gpu: Arc<Gpu>,
     dataset: &'a Dataset,
-    images: Vec<Image>,
     views: usize,
 }
 
 pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
-    let clock = Instant::now();
     let dataset = Dataset::open(&args.dataset, &OpenOptions::default())?;
     session.remarks.notes(&dataset);
     ensure!(!dataset.test.is_empty(), "the dataset has no test views to measure; a benchmark needs some");
     let gpu = session.open_gpu()?;
     let entries = entries(args, &dataset, &gpu)?;
     writable_folder(&args.out)?;
-    let images = {
-        let progress = Progress::new(session.remarks, "loading");
-        let count = dataset.train.len();
-        dataset.load_images(&dataset.train, &|done| progress.count(done, count, "images"))?
-    };
-    let load_seconds = clock.elapsed().as_secs_f64();
-    let course = Course { gpu, dataset: &dataset, images, views: args.views as usize };
+    let course = Course { gpu, dataset: &dataset, views: args.views as usize };
     let about = joined(
         circumstances(&course.gpu),
         json!({
@@ -80,7 +73,6 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
             "train_views": dataset.train.len(),
             "test_views": dataset.test.len(),
             "budget": entries.first().map(|entry| entry.setup.about.budget),
-            "load_seconds": load_seconds,
             "clock": CLOCK,
         }),
     );
@@ -98,7 +90,7 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
         // After every run: a benchmark that is interrupted keeps what it has.
         write(&args.out, &about, &runs)?;
     }
-    session.print(&joined(about, json!({ "configs": summaries(&runs) })), &table(&runs, load_seconds))
+    session.print(&joined(about, json!({ "configs": summaries(&runs) })), &table(&runs))
 }
 
 /// Every config with every seed, all checked before any of them is run.
@@ -139,8 +131,9 @@ impl Course<'_> {
     fn run(&self, entry: &Entry, session: &Session<'_>) -> Result<Run> {
         let setup = &entry.setup;
         let clock = Instant::now();
-        let mut views = Views::new(&self.gpu, &setup.plan, &setup.cameras, &setup.about.bounds)?;
-        self.images.iter().try_for_each(|image| views.add(&image.clone().into()))?;
+        let views = photos::load(setup, self.dataset, &self.gpu, session.remarks)?;
+        let load_seconds = clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
         let mut trainer = Trainer::new(&self.gpu, setup.plan.clone(), views)?;
         trainer.warm_up()?;
         let mut exam = Exam::new(&self.gpu, setup, trainer.workspace(), self.dataset, self.views)?
@@ -152,6 +145,7 @@ impl Course<'_> {
         Ok(Run {
             config: entry.config.clone(),
             seed: settings.seed,
+            load_seconds,
             compile_seconds,
             evaluate_seconds: clock.elapsed().as_secs_f64() - curve.seconds,
             curve,
@@ -208,6 +202,7 @@ fn summaries(runs: &[Run]) -> Vec<Value> {
             "steps": mean(|run| f64::from(run.curve.steps)),
             "seconds": mean(|run| run.curve.seconds),
             "samples_per_second": mean(|run| run.curve.samples_per_second),
+            "load_seconds": mean(|run| run.load_seconds),
             "compile_seconds": mean(|run| run.compile_seconds),
             "evaluate_seconds": mean(|run| run.evaluate_seconds),
         })
@@ -215,7 +210,7 @@ fn summaries(runs: &[Run]) -> Vec<Value> {
     by_config(runs).map(summary).collect()
 }
 
-fn table(runs: &[Run], load_seconds: f64) -> String {
+fn table(runs: &[Run]) -> String {
     let header = [
         "config",
         "seeds",
@@ -224,6 +219,7 @@ fn table(runs: &[Run], load_seconds: f64) -> String {
         "seconds",
         "steps",
         "samples/s",
+        "loading, s",
         "compiling, s",
         "measuring, s",
     ];
@@ -238,12 +234,13 @@ fn table(runs: &[Run], load_seconds: f64) -> String {
             format!("{:.1}", mean(|run| run.curve.seconds)),
             format!("{:.0}", mean(|run| f64::from(run.curve.steps))),
             short(mean(|run| run.curve.samples_per_second)),
+            format!("{:.1}", mean(|run| run.load_seconds)),
             format!("{:.1}", mean(|run| run.compile_seconds)),
             format!("{:.1}", mean(|run| run.evaluate_seconds)),
         ]
     };
     let rows: Vec<_> = by_config(runs).map(row).collect();
-    format!("{}\n\nloading the dataset once took {load_seconds:.1} s", markdown(&header, &rows))
+    markdown(&header, &rows)
 }
 
 #[cfg(test)]

@@ -1,14 +1,15 @@
 //! How much memory a training takes, on the device and on the host.
 
+use crate::commands::Session;
+use crate::commands::train::needs;
 use crate::commands::train::setup::{cameras, defaults};
-use crate::commands::{Session, needs};
 use anyhow::Result;
 use nerf::camera::Camera;
 use nerf::config::Config;
-use nerf::dataset::Dataset;
+use nerf::dataset::{Bounds, Dataset};
 use nerf::gpu::banks::Capacity;
 use nerf::health::Finding;
-use nerf::kernels::{Plan, Traits};
+use nerf::kernels::{Needs, Plan, Traits};
 use nerf::memory::Memory;
 use nerf::model::{Layout, finest_resolution};
 
@@ -25,6 +26,8 @@ pub(super) struct Estimate {
     pub(super) most_photo_bytes: Option<u64>,
     /// Grid cells along an axis at the finest level, which follow the photos.
     pub(super) finest: u32,
+    /// The parts of the program that stay out.
+    pub(super) left_out: Vec<String>,
     /// Why it does not fit.
     excess: Option<String>,
 }
@@ -39,8 +42,11 @@ impl Estimate {
         };
         let traits = gpu.as_ref().map_or(Traits::GPU, |gpu| Traits::of(gpu));
         let cameras = cameras(dataset, &dataset.train);
-        let plan = plan(traits, defaults(traits.is_cpu, dataset)?, dataset, &cameras);
-        let memory = Memory::of_training(&plan, &cameras, decoding(&cameras, dataset));
+        let config = defaults(traits.is_cpu, dataset)?;
+        let needs = needs::of_headers(dataset, &config)?;
+        let left_out = needs::left_out(&needs, &config);
+        let plan = plan(traits, config, needs, &dataset.bounds, &cameras);
+        let memory = Memory::of_training(&plan, &cameras, dataset.stream_bytes(&dataset.train));
         let excess = gpu.as_ref().and_then(|gpu| memory.check(gpu, &plan).err());
         Ok(Self {
             memory,
@@ -48,6 +54,7 @@ impl Estimate {
             is_cpu: traits.is_cpu,
             most_photo_bytes: gpu.map(|gpu| Capacity::of(&gpu.device.limits(), plan.memory).bytes()),
             finest: plan.layout.levels.last().map_or(0, |level| level.resolution),
+            left_out,
             excess: excess.map(|error| format!("{error:#}")),
         })
     }
@@ -61,16 +68,10 @@ impl Estimate {
     }
 }
 
-fn plan(traits: Traits, mut config: Config, dataset: &Dataset, cameras: &[Camera]) -> Plan {
+fn plan(traits: Traits, mut config: Config, needs: Needs, bounds: &Bounds, cameras: &[Camera]) -> Plan {
     if config.grid.finest == 0 {
-        config.grid.finest = finest_resolution(config.grid.base, &dataset.bounds, cameras);
+        config.grid.finest = finest_resolution(config.grid.base, bounds, cameras);
     }
     let layout = Layout::new(&config, config.grid.finest);
-    Plan::suited_to(traits, config, layout, needs::of(dataset))
-}
-
-/// Bytes of all photos decoded at once.
-fn decoding(cameras: &[Camera], dataset: &Dataset) -> u64 {
-    let bytes = if dataset.is_hdr { 16 } else { 4 };
-    cameras.iter().map(|camera| u64::from(camera.width) * u64::from(camera.height) * bytes).sum()
+    Plan::suited_to(traits, config, layout, needs)
 }

@@ -2,7 +2,9 @@
 
 use super::memory::Estimate;
 use super::{Report, problems};
+use nerf::dataset::Frame;
 use nerf::health::{Arrangement, Gaze, Severity, Spread};
+use nerf::image::BitDepth;
 use nerf::words::{bytes, count, length, percent, point, short};
 
 /// Width of the headings at the left.
@@ -20,7 +22,7 @@ impl Report<'_> {
             ("gaze", about_gaze(&self.survey.gaze, self.survey.views.len())),
             ("photos", self.about_photos()),
             ("memory", self.memory.as_ref().map_or_else(Vec::new, about_memory)),
-            ("left out", vec![self.left_out.join(", ")]),
+            ("left out", self.memory.iter().map(|estimate| estimate.left_out.join(", ")).collect()),
         ];
         let mut text = String::new();
         for (heading, lines) in sections {
@@ -65,14 +67,24 @@ impl Report<'_> {
             })
             .collect();
         let more = if self.survey.optics.sizes.len() > sizes.len() { ", …" } else { "" };
-        let range = if dataset.is_hdr { "scene-linear" } else { "sRGB" };
-        let alpha = dataset.frames.iter().filter(|frame| frame.has_alpha).count();
-        let alpha = match (alpha, dataset.is_cutout) {
+        let number = |holds: fn(&Frame) -> bool| dataset.frames.iter().filter(|frame| holds(frame)).count();
+        let alpha = match (number(|frame| frame.has_alpha), dataset.is_cutout) {
             (0, _) => "opaque".to_owned(),
-            (_, true) => format!("cut out by alpha in {}", count(alpha, "frame")),
-            (_, false) => format!("alpha in {}, opaque in the first", count(alpha, "frame")),
+            (frames, true) => format!("cut out by alpha in {}", count(frames, "frame")),
+            (frames, false) => format!("alpha in {}, opaque in the first", count(frames, "frame")),
         };
-        vec![format!("{}{more} pixels; {range}; {alpha}", sizes.join(", "))]
+        let beside = [("masks", number(|frame| frame.has_mask)), ("depth", number(|frame| frame.has_depth))];
+        let beside = beside.map(|(what, frames)| match frames {
+            0 => format!("no {what}"),
+            frames if frames == dataset.frames.len() => format!("{what} for all"),
+            frames => format!("{what} for {}", count(frames, "frame")),
+        });
+        vec![format!(
+            "{}{more} pixels, {}; {alpha}; {}",
+            sizes.join(", "),
+            bits(dataset.bit_depth),
+            beside.join(", ")
+        )]
     }
 
     fn about_cameras(&self) -> Vec<String> {
@@ -158,6 +170,15 @@ impl Report<'_> {
                 format!("a training would fail; {}, {}", count(errors, "error"), count(warnings, "warning"))
             }
         }
+    }
+}
+
+/// How finely pixels are stored.
+pub(super) fn bits(depth: BitDepth) -> &'static str {
+    match depth {
+        BitDepth::Eight => "8-bit sRGB",
+        BitDepth::Sixteen => "16-bit sRGB",
+        BitDepth::Float => "scene-linear float",
     }
 }
 

@@ -1,6 +1,8 @@
 //! The report as JSON.
 
+use super::page::bits;
 use super::{Report, problems};
+use nerf::dataset::Frame;
 use nerf::health::{Arrangement, Finding, Severity, Spread};
 use serde_json::{Value, json};
 
@@ -40,7 +42,7 @@ impl Report<'_> {
             "gaze": self.gaze(),
             "photos": self.photos(),
             "memory": self.memory_json(),
-            "left_out": self.left_out,
+            "left_out": self.memory.as_ref().map(|estimate| &estimate.left_out),
             "problems": self.problems.iter().map(|problem| self.problem(problem)).collect::<Vec<_>>(),
             "plot": self.args.plot.as_ref().map(|path| path.display().to_string()),
         })
@@ -51,8 +53,17 @@ impl Report<'_> {
         let sizes: Vec<_> = sizes
             .map(|([width, height], count)| json!({ "width": width, "height": height, "frames": count }))
             .collect();
-        let alpha = self.dataset.frames.iter().filter(|frame| frame.has_alpha).count();
-        json!({ "sizes": sizes, "with_alpha": alpha, "cut_out": self.dataset.is_cutout, "hdr": self.dataset.is_hdr })
+        let number =
+            |holds: fn(&Frame) -> bool| self.dataset.frames.iter().filter(|frame| holds(frame)).count();
+        json!({
+            "sizes": sizes,
+            "bits": bits(self.dataset.bit_depth),
+            "hdr": self.dataset.is_hdr,
+            "with_alpha": number(|frame| frame.has_alpha),
+            "cut_out": self.dataset.is_cutout,
+            "with_mask": number(|frame| frame.has_mask),
+            "with_depth": number(|frame| frame.has_depth),
+        })
     }
 
     fn optics(&self) -> Value {

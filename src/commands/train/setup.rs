@@ -1,6 +1,7 @@
 //! What is trained, on what, and for how long: the command line, the dataset and an earlier training together.
 
-use crate::commands::{find_frames, needs};
+use super::needs;
+use crate::commands::find_frames;
 use crate::progress::{duration, short};
 use crate::remarks::Remarks;
 use anyhow::{Result, ensure};
@@ -9,9 +10,8 @@ use nerf::checkpoint::{About, Checkpoint, FORMAT, Splits};
 use nerf::config::{Background, Config};
 use nerf::dataset::Dataset;
 use nerf::gpu::Gpu;
-use nerf::image::Image;
+use nerf::kernels::Plan;
 use nerf::kernels::training::accumulation_name;
-use nerf::kernels::{Needs, Plan};
 use nerf::model::finest_resolution;
 use nerf::orbit::Orbit;
 use nerf::schedule::Budget;
@@ -20,8 +20,6 @@ use std::path::Path;
 
 /// Seconds of training on a CPU when nothing is said.
 const CPU_SECONDS: f64 = 300.0;
-/// Photos that tell how bright a linear scene is.
-const PHOTOS_FOR_GREY: usize = 8;
 /// Steps on a GPU when nothing is said.
 const GPU_STEPS: u32 = 20_000;
 
@@ -74,7 +72,7 @@ impl Setup {
             None => (first(wishes, dataset, gpu)?, None, dataset.train.clone(), dataset.test.clone()),
             Some(Checkpoint { about, state }) => {
                 let (train, test) = same_frames(&about, dataset)?;
-                (again(wishes, about)?, Some(state), train, test)
+                (again(wishes, about, dataset)?, Some(state), train, test)
             }
         };
         about.dataset = wishes.dataset.to_owned();
@@ -92,7 +90,7 @@ impl Setup {
     }
 
     /// Says what was chosen, and what was left out.
-    pub(in crate::commands) fn describe(&self, dataset: &Dataset, gpu: &Gpu, remarks: Remarks) {
+    pub(in crate::commands) fn describe(&self, gpu: &Gpu, remarks: Remarks) {
         let About { config, budget, bounds, .. } = &self.about;
         remarks.say(&format!("{} views to train on, {} to measure on", self.train.len(), self.test.len()));
         remarks.detail(&format!(
@@ -115,12 +113,7 @@ impl Setup {
             ends.join(" or "),
             if self.state.is_some() { format!(", from step {} on", self.about.step) } else { String::new() }
         ));
-        remarks.say(&format!("left out: {}", self.left_out(dataset).join(", ")));
-    }
-
-    /// The parts that the scene does not need.
-    pub(in crate::commands) fn left_out(&self, dataset: &Dataset) -> Vec<String> {
-        needs::left_out(&self.plan.needs, self.about.config.background, dataset)
+        remarks.say(&format!("left out: {}", needs::left_out(&self.plan.needs, config).join(", ")));
     }
 }
 
@@ -159,6 +152,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
     }
     let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
     let orbit = Orbit::of(&cameras, bounds.center);
+    let needs = needs::of(dataset, &config)?;
     Ok(About {
         format: FORMAT,
         dataset: String::new(),
@@ -167,7 +161,8 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
         rays: config.batch.first_rays,
         seconds: 0.0,
         budget: Budget::default(),
-        needs: Needs { grey: grey(dataset)?, ..needs::of(dataset) },
+        needs,
+        reading: dataset.reading.clone(),
         splits: Splits { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) },
         image_size: [orbit.width, orbit.height],
         has_alpha: dataset.is_cutout,
@@ -177,22 +172,8 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
     })
 }
 
-/// Brightness of a typical pixel of linear photos, which the field then takes for 1; 1 for others.
-fn grey(dataset: &Dataset) -> Result<f32> {
-    if !dataset.is_hdr {
-        return Ok(1.0);
-    }
-    let count = dataset.train.len();
-    let few = (0..count.min(PHOTOS_FOR_GREY)).map(|i| dataset.train[i * count / count.min(PHOTOS_FOR_GREY)]);
-    let images = dataset.load_images(&few.collect::<Vec<_>>(), &|_| {})?;
-    let logs: Vec<f64> = images.iter().filter_map(Image::brightness).map(f64::ln).collect();
-    let grey = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp() as f32;
-    ensure!(grey.is_normal(), "the photos are as dark or as bright as {grey:e}: scale them to about 1");
-    Ok(grey)
-}
-
 /// The description of an earlier training with what the command line changes; the field's size stays.
-fn again(wishes: &Wishes<'_>, mut about: About) -> Result<About> {
+fn again(wishes: &Wishes<'_>, mut about: About, dataset: &Dataset) -> Result<About> {
     let config = configure(about.config.clone(), wishes)?;
     let changed = About { config, ..about.clone() };
     ensure!(
@@ -201,6 +182,7 @@ fn again(wishes: &Wishes<'_>, mut about: About) -> Result<About> {
          start anew with --overwrite"
     );
     about.config = changed.config;
+    about.needs.depth = needs::trains_on_depth(dataset, &about.config)?;
     Ok(about)
 }
 
@@ -226,7 +208,7 @@ fn same_frames(about: &About, dataset: &Dataset) -> Result<(Vec<usize>, Vec<usiz
     );
     ensure!(
         about.needs.hdr == dataset.is_hdr,
-        "the training began with images of another kind (8-bit or linear OpenEXR); resume with {}",
+        "the training began with images of another kind (display-referred or linear); resume with {}",
         about.dataset
     );
     Ok((train, find_frames(dataset, &about.splits.test).0))

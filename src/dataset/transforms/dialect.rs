@@ -101,6 +101,11 @@ mod tests {
             frame[key] = json!(0.1);
             frame
         };
+        let depth = {
+            let mut frame = own.clone();
+            frame["depth_path"] = json!("a.png");
+            frame
+        };
         let unturned = json!({"camera_model": "OPENCV", "orientation_override": "none"});
         let colmap = json!({"applied_transform": [[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0]], "fl_x": 9});
         let metashape = json!({"applied_transform": [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0]]});
@@ -108,7 +113,7 @@ mod tests {
             (json!({}), json!({"camera_angle_x": 0.7}), "blender"),
             (json!({}), json!({"aabb_scale": 4, "camera_angle_x": 0.7}), "instant-ngp"),
             (json!({"sharpness": 4}), json!({"camera_angle_x": 0.7}), "instant-ngp"),
-            (with("depth_path"), json!({"integer_depth_scale": 1e-4}), "instant-ngp (NeRFCapture)"),
+            (depth, json!({"integer_depth_scale": 1e-4}), "instant-ngp (NeRFCapture)"),
             (own.clone(), json!({"camera_model": "OPENCV"}), "nerfstudio"),
             (with("colmap_im_id"), json!({"camera_model": "OPENCV"}), "nerfstudio (COLMAP)"),
             (json!({}), colmap, "nerfstudio (COLMAP)"),

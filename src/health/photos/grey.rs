@@ -32,7 +32,7 @@ impl Grey {
                 false => straight(data[index].map(|value| f32::from(value) / 65_535.0)),
             }),
             Pixels::Linear(data) => {
-                let unit = photo.image.brightness().unwrap_or(1.0) as f32;
+                let unit = photo.image.grey().unwrap_or(1.0) as f32;
                 Self::blocks(size, side as usize, |index| match ignored(index) {
                     true => [0.0; 2],
                     false => toned(data[index], unit),

@@ -1,0 +1,94 @@
+//! What a scene needs of the kernels, and what is left out for it.
+
+use anyhow::{Result, ensure};
+use nerf::camera::LensKind;
+use nerf::config::{Background, Config};
+use nerf::dataset::{Dataset, Frame};
+use nerf::image::{BitDepth, Image};
+use nerf::kernels::Needs;
+
+/// Photos that tell how bright a linear scene is.
+const PHOTOS_FOR_GREY: usize = 8;
+
+/// What training on `dataset` needs.
+///
+/// # Errors
+/// When photos cannot be read, or are no use to what `config` asks for.
+pub(in crate::commands) fn of(dataset: &Dataset, config: &Config) -> Result<Needs> {
+    Ok(Needs { grey: grey(dataset)?, ..of_headers(dataset, config)? })
+}
+
+/// As [`of`], without looking at photos: their brightness is taken for 1.
+///
+/// # Errors
+/// When `config` asks for what the photos do not have.
+pub(in crate::commands) fn of_headers(dataset: &Dataset, config: &Config) -> Result<Needs> {
+    let used = dataset.train.iter().chain(&dataset.test);
+    Ok(Needs {
+        lenses: LensKind::among(used.map(|&index| &dataset.frames[index].camera)),
+        alpha: trains_on(dataset, |frame| frame.has_alpha),
+        hdr: dataset.is_hdr,
+        deep: dataset.bit_depth == BitDepth::Sixteen,
+        masks: trains_on(dataset, |frame| frame.has_mask),
+        depth: trains_on_depth(dataset, config)?,
+        grey: 1.0,
+        cascades: dataset.bounds.cascades,
+        cameras: dataset.train.len(),
+    })
+}
+
+/// Whether depth is asked for and there.
+///
+/// # Errors
+/// When it is asked for and not there.
+pub(in crate::commands) fn trains_on_depth(dataset: &Dataset, config: &Config) -> Result<bool> {
+    let has_depth = trains_on(dataset, |frame| frame.has_depth);
+    ensure!(
+        has_depth || config.loss.depth == 0.0,
+        "loss.depth is {}, and no training frame has a depth file; name them by `depth_file_path`, or set it to 0",
+        config.loss.depth
+    );
+    Ok(has_depth && config.loss.depth > 0.0)
+}
+
+fn trains_on(dataset: &Dataset, condition: impl Fn(&Frame) -> bool) -> bool {
+    dataset.train.iter().any(|&index| condition(&dataset.frames[index]))
+}
+
+/// Brightness of a typical pixel of linear photos, which the field then takes for 1; 1 for others.
+fn grey(dataset: &Dataset) -> Result<f32> {
+    if !dataset.is_hdr {
+        return Ok(1.0);
+    }
+    let all = dataset.train.len();
+    let count = all.min(PHOTOS_FOR_GREY);
+    let few: Vec<_> = (0..count).map(|i| dataset.train[i * all / count]).collect();
+    let mut logs = Vec::with_capacity(count);
+    dataset.stream(&few, false, &mut |_, photo| {
+        logs.extend(Image::grey(&photo.image).map(f64::ln));
+        Ok(())
+    })?;
+    let grey = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp() as f32;
+    ensure!(grey.is_normal(), "the photos are as dark or as bright as {grey:e}; scale them to about 1");
+    Ok(grey)
+}
+
+/// The parts that are not linked, with the reason.
+pub(in crate::commands) fn left_out(needs: &Needs, config: &Config) -> Vec<String> {
+    let parts = [
+        (needs.cascades == 1, "cascades and growing steps (the scene is bounded)"),
+        (!needs.alpha && !needs.hdr, "alpha (the images are opaque)"),
+        (!needs.hdr, "linear pixels and the relative loss (the images are display-referred)"),
+        (needs.hdr || !needs.deep, "16-bit pixels (no image has them)"),
+        (needs.hdr || needs.deep, "8-bit pixels (not all images have them)"),
+        (!needs.masks, "masks (there are none)"),
+        (!needs.depth, "depth (loss.depth is 0)"),
+        (config.background != Background::Random, "random backgrounds (not asked for)"),
+    ];
+    let absent = LensKind::ALL.into_iter().filter(|kind| !needs.lenses.contains(kind));
+    let absent: Vec<_> = absent.map(LensKind::name).collect();
+    let lenses =
+        (!absent.is_empty()).then(|| format!("lens models {} (no camera has them)", absent.join("/")));
+    let others = parts.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, part)| part.to_owned());
+    lenses.into_iter().chain(others).collect()
+}

@@ -1,0 +1,48 @@
+//! The training photos on their way from files to the device.
+
+use super::setup::Setup;
+use crate::progress::Progress;
+use crate::remarks::Remarks;
+use anyhow::Result;
+use nerf::dataset::Dataset;
+use nerf::gpu::Gpu;
+use nerf::memory::Memory;
+use nerf::views::Views;
+use nerf::words::bytes;
+use std::sync::Arc;
+
+/// What the training takes of host and device.
+pub(in crate::commands) fn memory(setup: &Setup, dataset: &Dataset) -> Memory {
+    Memory::of_training(&setup.plan, &setup.cameras, dataset.stream_bytes(&setup.train))
+}
+
+/// Decodes the training photos, a few at a time, and puts them on the device, unless there is no room for them.
+pub(in crate::commands) fn load(
+    setup: &Setup,
+    dataset: &Dataset,
+    gpu: &Arc<Gpu>,
+    remarks: Remarks,
+) -> Result<Views> {
+    let memory = memory(setup, dataset);
+    let [host, device, photos] = [memory.host_bytes, memory.device_bytes, memory.photo_bytes].map(bytes);
+    remarks.say(&format!("memory: {host} on the host, {device} on the device, {photos} of it photos"));
+    memory.check(gpu, &setup.plan)?;
+    let mut views = Views::new(gpu, &setup.plan, &setup.cameras, &setup.about.bounds)?;
+    let progress = Progress::new(remarks, "loading");
+    let mut ignored = Vec::new();
+    dataset.stream(&setup.train, setup.plan.needs.depth, &mut |position, photo| {
+        if photo.is_ignored() {
+            ignored.push(dataset.frames[setup.train[position]].name.as_str());
+        }
+        views.add(&photo)?;
+        progress.count(position + 1, setup.train.len(), "images");
+        Ok(())
+    })?;
+    if let Some(first) = ignored.first() {
+        progress.say(&format!(
+            "warning: masks ignore every pixel of {} training photos, which are not trained on: {first}, …",
+            ignored.len()
+        ));
+    }
+    Ok(views)
+}
