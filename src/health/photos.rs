@@ -2,7 +2,7 @@
 
 mod grey;
 
-use super::{Finding, Severity, Spread, names};
+use super::{Finding, Spread, names};
 use crate::dataset::{Dataset, Photo};
 use crate::words::count;
 use grey::{Grey, THUMBNAIL};
@@ -12,6 +12,8 @@ use std::collections::HashMap;
 const MOST_SIDE: u32 = 1024;
 /// Edges are found at this part of the size.
 const COARSE: u32 = 4;
+/// Fewer pixels at that size are too few to measure.
+const ENOUGH_PIXELS: usize = 150;
 /// Frames before and after that a photo is compared with.
 const NEIGHBOURS: usize = 3;
 /// A blurred photo has less than this part of the sharpness of its neighbours,
@@ -47,6 +49,8 @@ pub struct Look {
     pub white: f64,
     /// Whether every pixel is transparent or masked out.
     pub is_empty: bool,
+    /// Whether it has one brightness everywhere.
+    is_flat: bool,
     /// Tells pictures of different content apart.
     fingerprint: u64,
     /// Brightness in coarse blocks, to compare photos of one pose.
@@ -61,9 +65,10 @@ impl Look {
         let fine = Grey::of(photo, image.width.max(image.height).div_ceil(MOST_SIDE));
         let coarse = fine.reduced(COARSE);
         let edges = coarse.gradient_energy() * f64::from(COARSE * COARSE);
-        let has_edges = coarse.variance() > FLAT && edges > 0.0;
+        let has_edges = coarse.pixels() >= ENOUGH_PIXELS && coarse.variance() > FLAT && edges > 0.0;
         let [brightness, black, white] =
             coarse.opaque_means([|v| v.powf(2.2), |v| f32::from(v < BLACK), |v| f32::from(v > WHITE)]);
+        let is_empty = brightness.is_none() || photo.is_ignored();
         // Linear photos are toned by their own brightness.
         let brightness = if image.is_hdr() { brightness.and_then(|_| image.grey()) } else { brightness };
         Self {
@@ -71,7 +76,8 @@ impl Look {
             brightness,
             black: black.unwrap_or(0.0),
             white: white.filter(|_| !image.is_hdr()).unwrap_or(0.0),
-            is_empty: brightness.is_none() || (!photo.ignored.is_empty() && photo.ignored.iter().all(|&i| i)),
+            is_empty,
+            is_flat: coarse.variance() <= FLAT,
             fingerprint: fine.fingerprint(),
             thumbnail: coarse.thumbnail(),
         }
@@ -106,32 +112,37 @@ impl Gallery {
                 .into_iter()
                 .flatten()
                 .collect();
-        let mut all = |holds: &dyn Fn(&Look) -> bool, what: &str, remedy: &str| {
-            let frames = self.which(|(_, look)| holds(look));
-            if !frames.is_empty() {
-                let severity = if what.starts_with("show") { Severity::Warning } else { Severity::Note };
-                let message =
-                    format!("{} {what}: {}; {remedy}", count(frames.len(), "photo"), names(dataset, &frames));
-                findings.push(Finding { severity, message, frames });
-            }
-        };
-        all(
-            &|look| look.is_empty,
-            "show nothing: every pixel is transparent or masked out",
-            "check the alpha channel, or the masks for being inverted",
-        );
-        all(
-            &|look| !look.is_empty && look.black >= NEARLY_ALL,
-            "show nothing but black",
-            "drop those that are not meant to be black",
-        );
-        all(
-            &|look| look.white >= NEARLY_ALL,
-            "show nothing but white",
-            "drop those that are not meant to be white",
-        );
+        findings.extend(self.blank(dataset));
         findings.sort_by_key(|finding| finding.severity);
         findings
+    }
+
+    /// Photos that show nothing.
+    fn blank(&self, dataset: &Dataset) -> impl Iterator<Item = Finding> {
+        let kinds: [(fn(&Look) -> bool, &str, &str); 3] = [
+            (
+                |look| look.is_empty,
+                "nothing: every pixel is transparent or masked out",
+                "check the alpha channel, or the masks for being inverted",
+            ),
+            (
+                |look| !look.is_empty && look.black >= NEARLY_ALL,
+                "nothing but black",
+                "drop those that are not meant to be black",
+            ),
+            (
+                |look| look.white >= NEARLY_ALL,
+                "nothing but white",
+                "drop those that are not meant to be white",
+            ),
+        ];
+        kinds.into_iter().filter_map(|(holds, what, remedy)| {
+            let frames = self.which(|(_, look)| holds(look));
+            let number = count(frames.len(), "photo");
+            let verb = if frames.len() == 1 { "shows" } else { "show" };
+            let message = format!("{number} {verb} {what}: {}; {remedy}", names(dataset, &frames));
+            (!frames.is_empty()).then(|| Finding::warning(message).about(frames))
+        })
     }
 
     /// Whether two frames, which have one pose, show different pictures.
@@ -208,7 +219,7 @@ impl Gallery {
     fn repeated(&self, dataset: &Dataset) -> Option<Finding> {
         let mut first: HashMap<u64, usize> = HashMap::new();
         let mut pairs = Vec::new();
-        for (index, look) in self.looks.iter().filter(|(_, look)| look.sharpness.is_some()) {
+        for (index, look) in self.looks.iter().filter(|(_, look)| !look.is_flat) {
             match first.get(&look.fingerprint) {
                 Some(&other) => pairs.push([other, *index]),
                 None => _ = first.insert(look.fingerprint, *index),

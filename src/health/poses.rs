@@ -49,7 +49,10 @@ pub(super) fn outliers(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
         );
         findings.push(Finding::warning(message).about(frames));
     }
-    let jumps: Vec<usize> = jumps(&positions).into_iter().filter(|view| !far.contains(view)).collect();
+    let jumps: Vec<usize> = jumps(&positions)
+        .into_iter()
+        .filter(|view| !far.contains(view) && is_within_folder(scene, *view))
+        .collect();
     if is_few(&jumps, scene) {
         let step = |view: usize| positions[view].distance(positions[view - 1]);
         let frames = frames(scene, &jumps);
@@ -88,6 +91,13 @@ fn frames(scene: &Scene<'_>, views: &[usize]) -> Vec<usize> {
 
 fn is_few(views: &[usize], scene: &Scene<'_>) -> bool {
     !views.is_empty() && views.len() as f64 <= f64::max(1.0, FEW * scene.count() as f64)
+}
+
+/// Whether the frames before and after are of the same folder, and so perhaps of one sequence.
+fn is_within_folder(scene: &Scene<'_>, view: usize) -> bool {
+    let folder =
+        |view: usize| scene.dataset.frames[scene.views[view]].name.rsplit_once('/').map(|parts| parts.0);
+    folder(view - 1) == folder(view) && folder(view) == folder(view + 1)
 }
 
 /// The point whose coordinates are the middle ones.

@@ -9,6 +9,8 @@ use nerf::words::{bytes, count, length, percent, point, short};
 
 /// Width of the headings at the left.
 const MARGIN: usize = 10;
+/// Width of enumerations.
+const WIDTH: usize = 110;
 
 impl Report<'_> {
     pub(super) fn text(&self) -> String {
@@ -22,7 +24,7 @@ impl Report<'_> {
             ("gaze", about_gaze(&self.survey.gaze, self.survey.views.len())),
             ("photos", self.about_photos()),
             ("memory", self.memory.as_ref().map_or_else(Vec::new, about_memory)),
-            ("left out", self.memory.iter().map(|estimate| estimate.left_out.join(", ")).collect()),
+            ("left out", self.about_left_out()),
         ];
         let mut text = String::new();
         for (heading, lines) in sections {
@@ -39,7 +41,9 @@ impl Report<'_> {
     }
 
     fn about_dataset(&self) -> Vec<String> {
-        vec![format!("{}, {}", self.args.dataset.display(), self.dataset.dialect)]
+        let names = self.dataset.files.iter().filter_map(|path| path.file_name());
+        let names: Vec<_> = names.map(|name| name.to_string_lossy()).collect();
+        vec![format!("{}: {}; {}", self.args.dataset.display(), names.join(", "), self.dataset.dialect)]
     }
 
     fn about_frames(&self) -> Vec<String> {
@@ -153,6 +157,18 @@ impl Report<'_> {
             stops(brightness.min),
             stops(brightness.max),
         )]
+    }
+
+    fn about_left_out(&self) -> Vec<String> {
+        let parts = self.memory.iter().flat_map(|estimate| &estimate.left_out);
+        let mut lines: Vec<String> = Vec::new();
+        for part in parts {
+            match lines.last_mut() {
+                Some(line) if line.len() + part.len() < WIDTH => *line += &format!(", {part}"),
+                _ => lines.push(part.clone()),
+            }
+        }
+        lines
     }
 
     fn names_in_text(&self, frames: &[usize]) -> String {

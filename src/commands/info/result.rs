@@ -17,6 +17,7 @@ impl Report<'_> {
         let bounds = &dataset.bounds;
         json!({
             "dataset": self.args.dataset.display().to_string(),
+            "files": dataset.files,
             "ok": self.is_ok(),
             "dialect": dataset.dialect,
             "frames": dataset.listed,

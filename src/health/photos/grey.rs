@@ -67,6 +67,11 @@ impl Grey {
         Self::blocks([self.width, self.height], side as usize, |index| self.pixels[index])
     }
 
+    /// Number of pixels.
+    pub(super) fn pixels(&self) -> usize {
+        self.pixels.len()
+    }
+
     fn at(&self, x: usize, y: usize) -> f64 {
         f64::from(self.pixels[y * self.width + x][0])
     }
