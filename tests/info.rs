@@ -373,7 +373,7 @@ fn cameras_are_drawn() {
     }
     let text = fs::read_to_string(&svg).expect("readable");
     for part in
-        ["<svg", "from above: x to the right, y up", "0005 (", "19 train", "1 looks wrong", "world units"]
+        ["<svg", "from above: x to the right, y up", "0005 (", "19 train", "1 to check", "world units"]
     {
         assert!(text.contains(part), "{part}");
     }

@@ -67,11 +67,10 @@ pub(super) fn examine(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
     let readings = READINGS.iter().filter_map(|reading| Some((reading, agreement(scene, reading.turn)?)));
     let best = readings.min_by(|(_, a), (_, b)| a.miss.total_cmp(&b.miss));
     let Some((reading, agreement)) = best else { return Vec::new() };
+    let few = if gaze.seeing > 0.0 { format!("only {}", percent(gaze.seeing)) } else { "none".to_owned() };
     let seen = format!(
-        "only {} of the cameras see the point nearest to their axes, while read as {} {} of them look at {} and their \
-         axes pass it within {} of the distance",
-        percent(gaze.seeing),
-        reading.name,
+        "as they are, {few} of the cameras see a common point; read that way, {} see {} and their axes pass it at {} of \
+         the distance",
         percent(agreement.seeing),
         point(agreement.focus, scene.extent()),
         percent(agreement.miss)
@@ -79,9 +78,9 @@ pub(super) fn examine(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
     vec![if reading.is_turned_round && gaze.up.z > 0.5 {
         // Turned round, these cameras would be upside down in a world whose z points up.
         Finding::note(format!(
-            "the cameras look outwards: {seen}. That is right for photos taken around oneself; if the subject was in \
-             the middle, {}",
-            reading.remedy
+            "the cameras look outwards, which is right for photos taken around oneself; they may be {}: {seen}. If the \
+             subject was in the middle, {}",
+            reading.name, reading.remedy
         ))
     } else {
         Finding::warning(format!(

@@ -8,7 +8,7 @@ pub use drawing::Drawing;
 pub use pixels::Picture;
 
 use super::{Spread, Survey};
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens};
 use crate::dataset::{Bounds, Dataset, Split};
 use crate::words::{count, length, point};
 use drawing::{Anchor, Color, Shape, Stroke};
@@ -212,13 +212,24 @@ impl<'a> Map<'a> {
         if !panel.shows(position) {
             return panel.draw_arrow(position, stroke.color, drawing);
         }
+        let has_rims = camera.lens != Lens::Equirectangular;
+        if !has_rims {
+            // It sees everything.
+            let radius = 0.4 * self.frustum * panel.scale;
+            drawing.push(
+                Shape::circle(panel.place(position), radius).filled(stroke.color.faint(0.18)).with(stroke),
+            );
+        }
         let size = dvec2(f64::from(camera.width), f64::from(camera.height));
         let rims = [dvec2(0.0, 0.0), dvec2(1.0, 0.0), dvec2(1.0, 1.0), dvec2(0.0, 1.0)];
-        let rays: Vec<_> = rims.iter().filter_map(|rim| camera.ray(*rim * size)).collect();
+        let rays: Vec<_> =
+            (rims.iter().filter(|_| has_rims)).filter_map(|rim| camera.ray(*rim * size)).collect();
         let ends: Vec<DVec3> = rays.iter().map(|ray| ray.origin + self.frustum * ray.direction).collect();
         let picture: Vec<DVec2> = ends.iter().map(|end| panel.place(*end)).collect();
         let fill = stroke.color.faint(0.18);
-        drawing.push(Shape::closed(picture).filled(fill).with(stroke));
+        if has_rims {
+            drawing.push(Shape::closed(picture).filled(fill).with(stroke));
+        }
         for (ray, end) in rays.iter().zip(ends) {
             panel.line([ray.origin, end], stroke, drawing);
         }
@@ -263,7 +274,7 @@ impl<'a> Map<'a> {
             |color: Color| self.survey.views.iter().filter(|frame| self.color(**frame) == color).count();
         let mut x = MARGIN;
         let entries =
-            [(TRAIN, "train"), (VAL, "val"), (TEST, "test"), (MARKED, "looks wrong"), (FAINT, "unused")];
+            [(TRAIN, "train"), (VAL, "val"), (TEST, "test"), (MARKED, "to check"), (FAINT, "unused")];
         for (color, name) in entries {
             let number = number(color);
             if number > 0 {

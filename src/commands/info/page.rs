@@ -149,14 +149,16 @@ impl Report<'_> {
         let relative = |value: f64, spread: &Spread| value / spread.median.max(f64::MIN_POSITIVE);
         let (sharpness, brightness) = (gallery.sharpness(), gallery.brightness());
         let stops = |value: f64| format!("{:+.1}", relative(value, &brightness).max(1e-9).log2());
-        vec![format!(
-            "{} decoded; sharpness {:.1} to {:.1} times the median, brightness {} to {} stops from the median",
-            gallery.looks.len(),
-            relative(sharpness.min, &sharpness),
-            relative(sharpness.max, &sharpness),
-            stops(brightness.min),
-            stops(brightness.max),
-        )]
+        let mut line = format!("{} decoded", gallery.looks.len());
+        if sharpness.max > 0.0 {
+            let [least, most] = [sharpness.min, sharpness.max].map(|value| relative(value, &sharpness));
+            line += &format!("; sharpness {least:.1} to {most:.1} times the median");
+        }
+        if brightness.max > 0.0 {
+            let [least, most] = [brightness.min, brightness.max].map(stops);
+            line += &format!("; brightness {least} to {most} stops from the median");
+        }
+        vec![line]
     }
 
     fn about_left_out(&self) -> Vec<String> {

@@ -135,7 +135,8 @@ impl Panel {
         for line in [[from, to], [from - tick, from + tick], [to - tick, to + tick]] {
             drawing.push(Shape::line(line).with(Stroke::new(INK, 1.4)));
         }
-        let name = format!("{} world units", plain(round));
+        let unit = if round == 1.0 { "world unit" } else { "world units" };
+        let name = format!("{} {unit}", plain(round));
         drawing.text(0.5 * (from + to) - dvec2(0.0, 8.0), &name, TEXT, FAINT, Anchor::Middle);
     }
 }
