@@ -71,7 +71,7 @@ impl Camera {
 
     /// Where a ball is imaged: a point of pixel space, and a distance from it in pixels that holds the whole image.
     /// `None` where there is no such disc, or none that is worth computing: at the rim of a lens, where an image
-    /// wraps around, and around the camera.
+    /// wraps around, and around the camera. For pinholes the distance is that of a ball on the axis.
     pub fn footprint(&self, center: DVec3, radius: f64) -> Option<(DVec2, f64)> {
         let seen = self.world_from_camera.inverse().transform_point3(center);
         let (plane, depth) = self.lens.image(seen)?;
@@ -309,7 +309,10 @@ mod tests {
                 let height = 1.0 - (f64::from(index) + 0.5) / 200.0;
                 let flat = (1.0 - height * height).sqrt();
                 let out = DVec3::new(flat * turn.cos(), flat * turn.sin(), height);
-                let (center, radius) = (camera.position() + 3.0 * out, 0.05 + 0.002 * f64::from(index % 100));
+                let (center, radius) = (
+                    camera.position() + 3.0 * out,
+                    0.05 + 0.002 * f64::from(index % 100) * f64::from(index % 7),
+                );
                 let Some((middle, reach)) = camera.footprint(center, radius) else { continue };
                 held += 1;
                 for step in 0..60 {

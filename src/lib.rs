@@ -22,7 +22,8 @@
 //! - Camera axes are OpenGL's: +X right, +Y up, the camera looks along -Z. Pixel centres lie at `+0.5`.
 //! - A field of images in 8 or 16 bits holds display-referred (sRGB) colours, and is composited as such; a field
 //!   of OpenEXR or Radiance HDR images holds linear light. Rendered colours are premultiplied by their opacity.
-//! - Depth is the mean distance along the view axis, in world units.
+//! - Depth is the mean distance along the view axis, or along the ray where a lens sees sideways and behind
+//!   ([`camera::LensKind::depth_is_distance`]), in world units.
 //! - Gradients are called `d_<name>` for the derivative of the loss by `<name>`.
 //!
 //! # A training in code

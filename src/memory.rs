@@ -12,7 +12,7 @@ use serde::Serialize;
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
 /// Bytes of the program itself, its driver and the kernels that it compiles.
-const BASE_BYTES: u64 = 400 << 20;
+const BASE_BYTES: u64 = 640 << 20;
 
 /// Bytes at the peak of a training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

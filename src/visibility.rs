@@ -186,7 +186,7 @@ mod tests {
             Lens::Equirectangular,
         ] {
             let camera = camera(lens);
-            let opaque = |x: u32, y: u32| (x / 32 + y / 32) % 2 == 0;
+            let opaque = |x: u32, y: u32| (x / 32 + y / 32).is_multiple_of(2);
             let pixels = (0..SIZE * SIZE).map(|i| [255 * u8::from(opaque(i % SIZE, i / SIZE)); 4]).collect();
             let image = Image { width: SIZE, height: SIZE, has_alpha: true, pixels: Pixels::Srgb8(pixels) };
             let views = [camera.clone(), camera.clone(), camera.clone()];

@@ -26,11 +26,13 @@ pub(super) fn image(k: &[f64; 4], point: DVec3) -> Option<DVec2> {
 /// [`super::Lens::stretch`].
 pub(super) fn stretch(k: &[f64; 4], point: DVec3, spread: f64) -> Option<f64> {
     /// Angles between which both vary little, and how much more they may be in between.
-    const ANGLES: u32 = 8;
-    const BETWEEN: f64 = 1.1;
+    const ANGLES: u32 = 4;
+    const BETWEEN: f64 = 1.15;
+    /// Farther apart they may vary much.
+    const MOST_SPREAD: f64 = 0.3;
     let theta = point.x.hypot(point.y).atan2(-point.z);
     let (low, high) = ((theta - spread).max(0.0), theta + spread);
-    if high >= PI || !is_within_rim(k, high) {
+    if spread > MOST_SPREAD || high >= PI || !is_within_rim(k, high) {
         return None;
     }
     let angles = (0..=ANGLES).map(|step| low + (high - low) * f64::from(step) / f64::from(ANGLES));

@@ -124,8 +124,8 @@ impl Lens {
     }
 
     /// The most that the image of a direction moves on the plane per radian that the direction turns, anywhere within
-    /// the angle `spread` of `point`, which is imaged at `plane`. `None` at the rim, where the image wraps around, and
-    /// for lenses whose image is not one of angles.
+    /// the angle `spread` of `point`, which is imaged at `plane`. `None` at the rim, where the image wraps around, for
+    /// wide spreads, and for lenses whose image is not one of angles.
     pub(super) fn stretch(&self, plane: DVec2, point: DVec3, spread: f64) -> Option<f64> {
         match self {
             Self::Fisheye { k } => fisheye::stretch(k, point, spread),

@@ -20,7 +20,7 @@ use crate::file::write_atomically;
 pub struct ExrPixels<'a> {
     /// Scene-linear colour premultiplied with alpha: channels R, G, B, A.
     pub color: &'a [[f32; 4]],
-    /// Depth along the view axis in world units: channel Z.
+    /// Depth (see [`crate::camera::LensKind::depth_is_distance`]) in world units: channel Z.
     pub depth: Option<&'a [f32]>,
 }
 

@@ -1,13 +1,38 @@
 //! Rays whose way through the box is known.
 
 use anyhow::Result;
-use glam::DVec3;
+use glam::{DAffine3, DVec2, DVec3};
+use nerf::camera::{Camera, Lens, LensKind};
 use nerf::check::Setup;
 use nerf::check::rays::{DeviceRay, pixel_camera};
+use nerf::dataset::Bounds;
 use nerf::kernels::viewing;
+use nerf::render::Renderer;
 
 use crate::bench::workbench;
 use crate::close::assert_close;
+
+/// A renderer says so when a camera has a lens that it was not built for.
+#[test]
+fn lenses_that_were_left_out_are_refused() -> Result<()> {
+    let bench = workbench(Setup::tiny())?;
+    let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades: 1, source: String::new() };
+    let linked = [LensKind::Pinhole, LensKind::OpenCv].into();
+    let mut renderer = Renderer::new(&bench.gpu, &bench.plan, &bench.workspace, &bounds, &linked)?;
+    let mut camera = Camera {
+        width: 3,
+        height: 2,
+        focal_px: DVec2::splat(2.0),
+        center_px: DVec2::new(1.5, 1.0),
+        lens: Lens::Fisheye { k: [0.0; 4] },
+        world_from_camera: DAffine3::from_translation(2.0 * DVec3::Z),
+    };
+    let refusal = format!("{:#}", renderer.render(&camera).expect_err("it is not linked"));
+    assert!(refusal.contains("pinhole, OpenCV") && refusal.contains("fisheye"), "{refusal}");
+    camera.lens = Lens::Pinhole;
+    assert_eq!(renderer.render(&camera)?.depth.len(), 6);
+    Ok(())
+}
 
 /// Rays along the axes, from inside, from outside, and past the box.
 #[test]

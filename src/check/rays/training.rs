@@ -126,6 +126,9 @@ impl Photos {
                     let distance = depth / along;
                     tally.value(depths[index].into(), distance, 1.0 + distance, || format!("{case}, depth"));
                 }
+                let origin = (want.origin - bounds().min()) / (2.0 * bounds().outer_half());
+                let size = 1.0 + origin.abs().max_element();
+                tally.each(&format!("{case}, origin"), &ray.origin.to_array(), &origin.to_array(), |_| size);
             }
             let behind = match bench.plan.config.background {
                 Background::Random => {
