@@ -119,7 +119,8 @@ impl Gallery {
 
     /// Photos that show nothing.
     fn blank(&self, dataset: &Dataset) -> impl Iterator<Item = Finding> {
-        let kinds: [(fn(&Look) -> bool, &str, &str); 3] = [
+        type Kind = (fn(&Look) -> bool, &'static str, &'static str);
+        let kinds: [Kind; 3] = [
             (
                 |look| look.is_empty,
                 "nothing: every pixel is transparent or masked out",
