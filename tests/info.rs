@@ -190,6 +190,22 @@ fn poses_read_the_wrong_way_are_told_with_the_remedy() {
 }
 
 #[test]
+fn rolled_pictures_are_noted() {
+    let toys = Toys::new();
+    toys.edit("train", |file| {
+        for frame in file["frames"].as_array_mut().expect("a list").iter_mut().skip(12) {
+            for row in frame["transform_matrix"].as_array_mut().expect("rows").iter_mut().take(3) {
+                row.as_array_mut().expect("numbers").swap(0, 1);
+            }
+            scale_column(&mut frame["transform_matrix"], 0, -1.0);
+        }
+    });
+    let result = toys.info();
+    result.expect(0, "note", &["of 24 pictures are rolled by more than 45°", "turn them back"], &[]);
+    assert_eq!(result.of_severity("warning"), [""; 0]);
+}
+
+#[test]
 fn stray_cameras_are_named() {
     let toys = Toys::new();
     toys.edit("train", |file| file["frames"][5]["transform_matrix"][0][3] = json!(300.0));

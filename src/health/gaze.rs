@@ -3,7 +3,7 @@
 use super::{Finding, Scene, Spread};
 use crate::dataset::focus::FocusKind;
 use crate::orbit::Orbit;
-use crate::words::{length, percent};
+use crate::words::{count, length, percent};
 use glam::DVec3;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -61,6 +61,11 @@ const PARALLEL_DEGREES: f64 = 2.0;
 /// Axes within this angle look from one side.
 const FACING_DEGREES: f64 = 40.0;
 
+/// Cosine between the view and the upright of a camera that looks up or down.
+const STEEP: f64 = 0.9;
+/// Part of the pictures that are rolled on purpose now and then.
+const MANY_ROLLED: f64 = 0.25;
+
 impl Gaze {
     pub(super) fn of(scene: &Scene<'_>) -> Self {
         let focus = scene.focus.point;
@@ -116,7 +121,30 @@ impl Gaze {
                  or empty, write `aabb`: [[x, y, z], [x, y, z]], the corners of what to show, into the file",
             ));
         }
+        findings.extend(self.rolled(scene));
         findings
+    }
+
+    /// Many pictures that do not stand upright, in any world direction.
+    fn rolled(&self, scene: &Scene<'_>) -> Option<Finding> {
+        let axes: Vec<_> = scene.cameras().map(|camera| camera.world_from_camera.matrix3).collect();
+        // Where a camera looks up or down, its picture has no upright.
+        let is_rolled = |view: usize| {
+            let looks_level = axes[view].z_axis.dot(self.up).abs() < STEEP;
+            looks_level && axes[view].y_axis.dot(self.up) < axes[view].x_axis.dot(self.up).abs()
+        };
+        let frames = scene.which(is_rolled);
+        let many = frames.len() as f64 > MANY_ROLLED * scene.count() as f64;
+        many.then(|| {
+            let message = format!(
+                "{} of {} are rolled by more than 45° from upright, as far as the others tell: {}; that is no harm where \
+                 the camera was turned, but if the image files were turned after their poses were found, turn them back",
+                frames.len(),
+                count(scene.count(), "picture"),
+                scene.names(&frames)
+            );
+            Finding::note(message).about(frames)
+        })
     }
 }
 
