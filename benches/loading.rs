@@ -1,74 +1,131 @@
-//! How fast photos are decoded, and how much memory that takes.
+//! How fast photos are loaded, and in how much memory, from files to the first step of a training.
 //!
-//! Writes JPEGs to a temporary folder and streams them as a training does, once for each number of threads:
-//! `cargo bench --bench loading -- [COUNT] [WIDTH] [HEIGHT]`, 200 of 1920x1080 if nothing is said. The peak is
-//! that of the process (Linux only), which does nothing else.
+//! `cargo bench --bench loading -- [COUNTxWIDTHxHEIGHT …]` writes JPEGs to a temporary folder (below `TMPDIR`), and
+//! loads each case in a process of its own, since a peak never falls. It prints a Markdown table; the peak is that of
+//! the whole process (Linux only), the device's memory included where the adapter is a CPU.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use image::{ImageBuffer, ImageFormat, Rgb};
-use nerf::dataset::{Dataset, HoldOut, OpenOptions};
+use nerf::camera::{Camera, LensKind};
+use nerf::config::Config;
+use nerf::dataset::{Dataset, HoldOut, OpenOptions, Reading};
+use nerf::gpu::{Gpu, adapter};
+use nerf::kernels::{Needs, Plan};
+use nerf::memory::Memory;
+use nerf::model::{Layout, finest_resolution};
+use nerf::train::Trainer;
+use nerf::views::Views;
+use nerf::words::bytes;
 use rayon::prelude::*;
 
+/// Measured if nothing is said.
+const CASES: [Case; 6] = [
+    Case { count: 1000, size: [480, 270] },
+    Case { count: 100, size: [1920, 1080] },
+    Case { count: 300, size: [1920, 1080] },
+    Case { count: 1000, size: [1920, 1080] },
+    Case { count: 100, size: [3840, 2160] },
+    Case { count: 30, size: [6000, 4000] },
+];
+/// The environment variable that tells a child its folder and its number of photos.
+const CHILD: &str = "NERF_LOADING_BENCH";
+
+/// So many photos of one size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Case {
+    count: usize,
+    size: [u32; 2],
+}
+
 fn main() -> Result<()> {
-    let numbers: Vec<u32> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
-    let number = |place: usize, otherwise: u32| numbers.get(place).copied().unwrap_or(otherwise);
-    let (count, size) = (number(0, 200), [number(1, 1920), number(2, 1080)]);
-    if let Ok(folder) = std::env::var("NERF_LOADING_BENCH") {
-        return load(Path::new(&folder));
+    if let Ok(task) = std::env::var(CHILD) {
+        let (folder, count) = task.rsplit_once('*').context("expected FOLDER*COUNT")?;
+        return load(Path::new(folder), count.parse()?);
     }
-    let folder = tempfile::tempdir()?;
-    let bytes = write(folder.path(), count, size)?;
-    println!("{count} JPEGs of {}x{}, {:.2} MB each on average", size[0], size[1], bytes as f64 / 1e6);
-    // Each in a process of its own: a peak never falls.
-    let threads = std::thread::available_parallelism()?.get();
-    for threads in (0..).map(|power| 1 << power).take_while(|&count| count <= threads) {
-        let status = std::process::Command::new(std::env::current_exe()?)
-            .env("NERF_LOADING_BENCH", folder.path())
-            .env("RAYON_NUM_THREADS", threads.to_string())
-            .status()?;
-        anyhow::ensure!(status.success(), "loading failed");
-    }
-    Ok(())
-}
-
-fn load(folder: &Path) -> Result<()> {
-    let clock = Instant::now();
-    let dataset = Dataset::open(folder, &OpenOptions { hold_out: HoldOut::None, ..OpenOptions::default() })?;
-    let opened = clock.elapsed().as_secs_f64();
-    let clock = Instant::now();
-    let mut sum = 0;
-    dataset.stream(&dataset.train, false, &mut |_, photo| {
-        sum += u64::from(photo.image.width);
-        Ok(())
-    })?;
-    let seconds = clock.elapsed().as_secs_f64();
-    let count = dataset.train.len() as f64;
+    let asked: Vec<Case> = std::env::args().filter_map(|text| Case::parse(&text)).collect();
+    let cases = if asked.is_empty() { CASES.to_vec() } else { asked };
     println!(
-        "{} threads: opened in {opened:.2} s, {:.1} images/s ({:.0} ms each); stated {} MB, peak of the process {}",
-        rayon::current_num_threads(),
-        count / seconds,
-        1e3 * seconds / count,
-        dataset.stream_bytes(&dataset.train) / 1_000_000,
-        peak().unwrap_or_else(|| "unknown".to_owned()),
+        "| photos | size | MB each | opened, s | loaded, s | photos/s | stated: host | stated: device | peak of the \
+         process |\n| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
     );
-    assert!(sum > 0);
+    let folder = tempfile::tempdir()?;
+    for case in &cases {
+        let [width, height] = case.size;
+        let photos = folder.path().join(format!("{width}x{height}"));
+        let most = cases.iter().filter(|other| other.size == case.size).map(|other| other.count).max();
+        if !photos.exists() {
+            std::fs::create_dir(&photos)?;
+            write(&photos, most.unwrap_or(case.count) as u32, case.size)?;
+        }
+        let status = std::process::Command::new(std::env::current_exe()?)
+            .env(CHILD, format!("{}*{}", photos.display(), case.count))
+            .status()?;
+        ensure!(status.success(), "loading {} photos of {width}x{height} failed", case.count);
+    }
     Ok(())
 }
 
-/// The most memory that this process has had in use.
-fn peak() -> Option<String> {
+impl Case {
+    /// `COUNTxWIDTHxHEIGHT`.
+    fn parse(text: &str) -> Option<Self> {
+        let numbers: Vec<u32> = text.split('x').map(|part| part.parse().ok()).collect::<Option<_>>()?;
+        let [count, width, height] = numbers[..] else { return None };
+        Some(Self { count: count as usize, size: [width, height] })
+    }
+}
+
+/// Loads the first `count` photos of a folder for a training with the adapter's defaults, and takes a step.
+fn load(folder: &Path, count: usize) -> Result<()> {
+    let clock = Instant::now();
+    let reading = Reading { max_images: Some(count), ..Reading::default() };
+    let options = OpenOptions { hold_out: HoldOut::None, reading, ..OpenOptions::default() };
+    let dataset = Dataset::open(folder, &options)?;
+    let opened = clock.elapsed().as_secs_f64();
+    let cameras: Vec<Camera> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
+    let gpu = Arc::new(Gpu::open(&adapter::choose(None)?)?);
+    let cascades = dataset.bounds.cascades;
+    let config = if gpu.is_cpu() { Config::for_cpu(cascades > 1)? } else { Config::default() };
+    let layout = Layout::new(&config, finest_resolution(config.grid.base, &dataset.bounds, &cameras));
+    let lenses = LensKind::among(&cameras);
+    let needs = Needs { lenses, cascades, cameras: cameras.len(), ..Needs::default() };
+    let plan = Plan::new(&gpu, config, layout, needs);
+    let memory = Memory::of_training(&plan, &cameras, dataset.stream_bytes(&dataset.train));
+    memory.check(&gpu, &plan)?;
+    let clock = Instant::now();
+    let mut views = Views::new(&gpu, &plan, &cameras, &dataset.bounds)?;
+    dataset.stream(&dataset.train, false, &mut |_, photo| views.add(&photo))?;
+    let loaded = clock.elapsed().as_secs_f64();
+    let mut trainer = Trainer::new(&gpu, plan, views)?;
+    trainer.step(0.0, None)?;
+    trainer.report()?;
+    let sizes = dataset.train.iter().map(|&i| Ok(dataset.frames[i].path.metadata()?.len()));
+    let megabytes = sizes.sum::<std::io::Result<u64>>()? as f64 / 1e6 / count as f64;
+    let [width, height] = cameras.first().map_or([0, 0], |camera| [camera.width, camera.height]);
+    println!(
+        "| {count} | {width}x{height} | {megabytes:.2} | {opened:.2} | {loaded:.1} | {:.1} | {} | {} | {} |",
+        count as f64 / loaded,
+        bytes(memory.host_bytes),
+        bytes(memory.device_bytes),
+        peak().map_or_else(|| "unknown".to_owned(), bytes),
+    );
+    Ok(())
+}
+
+/// The most bytes that this process has had in use.
+fn peak() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kilobytes: f64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
-    Some(format!("{:.0} MB", kilobytes * 1.024e-3))
+    let kilobytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
+    Some(kilobytes << 10)
 }
 
-/// Photos with shapes of all sizes and some grain; their mean number of bytes.
-fn write(folder: &Path, count: u32, [width, height]: [u32; 2]) -> Result<u64> {
-    let draw = |index: u32| -> Result<u64> {
+/// Photos with shapes of all sizes and some grain.
+fn write(folder: &Path, count: u32, [width, height]: [u32; 2]) -> Result<()> {
+    let draw = |index: u32| -> Result<()> {
         let color = |x: u32, y: u32| {
             let (u, v) = (x as f32 / 97.0, (y + 40 * index) as f32 / 61.0);
             let wave = (u.sin() * v.cos() + (5.0 * u + v).sin() * 0.3) * 0.4 + 0.5;
@@ -79,10 +136,9 @@ fn write(folder: &Path, count: u32, [width, height]: [u32; 2]) -> Result<u64> {
             Rgb([value, 255 - value, value / 2 + 60])
         };
         let path = folder.join(format!("{index:04}.jpg"));
-        ImageBuffer::from_fn(width, height, color).save_with_format(&path, ImageFormat::Jpeg)?;
-        Ok(path.metadata()?.len())
+        Ok(ImageBuffer::from_fn(width, height, color).save_with_format(&path, ImageFormat::Jpeg)?)
     };
-    let bytes: Vec<u64> = (0..count).into_par_iter().map(draw).collect::<Result<_>>()?;
+    (0..count).into_par_iter().try_for_each(draw)?;
     let frame = |index: u32| {
         let angle = f64::from(index) * 0.1;
         let (sin, cos) = angle.sin_cos();
@@ -94,6 +150,5 @@ fn write(folder: &Path, count: u32, [width, height]: [u32; 2]) -> Result<u64> {
     };
     let listing =
         serde_json::json!({ "camera_angle_x": 0.9, "frames": (0..count).map(frame).collect::<Vec<_>>() });
-    std::fs::write(folder.join("transforms.json"), listing.to_string())?;
-    bytes.iter().sum::<u64>().checked_div(u64::from(count)).context("expected at least one image")
+    Ok(std::fs::write(folder.join("transforms.json"), listing.to_string())?)
 }

@@ -19,6 +19,7 @@ mod sidecars;
 mod splits;
 pub mod transforms;
 
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -129,13 +130,8 @@ impl Dataset {
 
     /// Number of different cameras: sizes, intrinsics and lenses, whatever the pose.
     pub fn distinct_cameras(&self) -> usize {
-        let mut distinct: Vec<Camera> = Vec::new();
-        for frame in &self.frames {
-            let camera = Camera { world_from_camera: glam::DAffine3::IDENTITY, ..frame.camera };
-            if !distinct.contains(&camera) {
-                distinct.push(camera);
-            }
-        }
-        distinct.len()
+        let pose = glam::DAffine3::IDENTITY;
+        let camera = |frame: &Frame| format!("{:?}", Camera { world_from_camera: pose, ..frame.camera });
+        self.frames.iter().map(camera).collect::<HashSet<_>>().len()
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Result, bail, ensure};
 use rayon::prelude::*;
 
 use super::bounds::{Bounds, Surroundings};
@@ -10,7 +10,7 @@ use super::located::{Present, locate};
 use super::notes::Notes;
 use super::photo::How;
 use super::reading::{AlphaMode, Reading};
-use super::transforms::{self, Entry, Listing};
+use super::transforms::{self, Entry};
 use super::{Dataset, Frame, HoldOut, OpenOptions, Split, splits};
 use crate::camera::Camera;
 use crate::image::{BitDepth, Evidence, Multiplied};
@@ -34,8 +34,9 @@ impl Dataset {
         let mut located = Vec::new();
         let mut scene_box = None;
         let mut dialect = "";
-        for (split, source) in &sources {
-            let listing = read(source)?;
+        let files: Vec<&Path> = sources.iter().map(|(_, path)| path.as_path()).collect();
+        let listings = transforms::read(&files, &mut notes)?;
+        for ((split, _), listing) in sources.iter().zip(listings) {
             let is_first = located.is_empty();
             if is_first {
                 dialect = listing.dialect;
@@ -128,7 +129,8 @@ pub fn read_cameras(path: &Path, default_size: [u32; 2]) -> Result<Vec<(String, 
         let camera = entry.intrinsics.camera(size, entry.world_from_camera).0;
         (entry.file_path, camera)
     };
-    Ok(read(path)?.frames.into_iter().map(camera).collect())
+    let listings = transforms::read(&[path], &mut Notes::default())?;
+    Ok(listings.into_iter().flat_map(|listing| listing.frames).map(camera).collect())
 }
 
 /// The files to read, training first, each with the split it stands for.
@@ -189,11 +191,6 @@ fn folder_of(file: &Path) -> PathBuf {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
         _ => PathBuf::from("."),
     }
-}
-
-fn read(path: &Path) -> Result<Listing> {
-    let read = || transforms::parse_bytes(&std::fs::read(path)?);
-    read().with_context(|| format!("reading {}", path.display()))
 }
 
 impl Entry {

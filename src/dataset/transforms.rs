@@ -5,6 +5,8 @@ mod outline;
 mod scene_box;
 mod split_lists;
 
+use std::path::Path;
+
 use anyhow::{Context, Result, bail, ensure};
 use glam::DAffine3;
 use serde_json::Value;
@@ -56,13 +58,39 @@ impl Listing {
     }
 }
 
+/// Parses files of one dataset, whose poses follow one rule. Errors name the file, the frame and the key.
+pub(super) fn read(paths: &[&Path], notes: &mut Notes) -> Result<Vec<Listing>> {
+    let read = |path: &Path| parse_alone(&json::decode(&std::fs::read(path)?)?);
+    let named = |path: &&Path| read(path).with_context(|| format!("reading {}", path.display()));
+    let mut listings: Vec<Listing> = paths.iter().map(named).collect::<Result<_>>()?;
+    let context = || paths.first().map_or_else(String::new, |path| format!("reading {}", path.display()));
+    handedness::settle(&mut listings, notes).with_context(context)?;
+    Ok(listings)
+}
+
 /// Parses the bytes of one file. Errors name the frame and the key.
+///
+/// # Errors
+/// When it cannot be understood.
 pub fn parse_bytes(bytes: &[u8]) -> Result<Listing> {
     parse(&json::decode(bytes)?)
 }
 
 /// Parses the text of one file. Errors name the frame and the key.
+///
+/// # Errors
+/// When it cannot be understood.
 pub fn parse(text: &str) -> Result<Listing> {
+    let mut listings = [parse_alone(text)?];
+    let mut notes = Notes::default();
+    handedness::settle(&mut listings, &mut notes)?;
+    let [mut listing] = listings;
+    listing.notes.append(notes);
+    Ok(listing)
+}
+
+/// As [`parse`], without a look at whether poses are mirrored.
+pub(super) fn parse_alone(text: &str) -> Result<Listing> {
     let document = json::parse(text)?;
     let sections = outline::sections(&document)?;
     let mut notes = Notes::default();
@@ -80,7 +108,6 @@ pub fn parse(text: &str) -> Result<Listing> {
         }
     }
     report_unposed(&unposed, entries.len(), &mut notes)?;
-    handedness::settle(&mut entries, &mut notes)?;
     let around = sections.first().map_or(&[][..], |section| &section.around);
     let mut scene_box = None;
     for &file in around {

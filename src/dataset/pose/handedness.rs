@@ -4,33 +4,37 @@ use anyhow::{Result, ensure};
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::dataset::notes::Notes;
-use crate::dataset::transforms::Entry;
+use crate::dataset::transforms::{Entry, Listing};
 
-/// Makes one reading of all poses of a file. Where nearly all are mirrored, that is how the file means it,
+/// Makes one reading of all poses of a dataset's files. Where nearly all are mirrored, that is how they are meant,
 /// and there are two ways to mean it: right, up, back in a left-handed world, which is kept; or right, up,
 /// forward in a right-handed one, as game engines have it, whose third axis is turned round. The second is
 /// taken where the third axes meet in front of the cameras. Where few are mirrored, they are left out.
-pub(in crate::dataset) fn settle(entries: &mut Vec<Entry>, notes: &mut Notes) -> Result<()> {
-    let count = entries.len();
-    let mirrored = entries.iter().filter(|entry| is_mirrored(entry)).count();
-    if mirrored == 0 {
-        remark_on_axes(entries, notes);
+pub(in crate::dataset) fn settle(listings: &mut [Listing], notes: &mut Notes) -> Result<()> {
+    let all: Vec<&Entry> = listings.iter().flat_map(|listing| &listing.frames).collect();
+    let mirrored: Vec<&&Entry> = all.iter().filter(|entry| is_mirrored(entry)).collect();
+    let (count, agreement) = (all.len(), Convergence::of(&all));
+    let Some(first) = mirrored.first() else {
+        remark_on_axes(count, agreement, notes);
         return Ok(());
-    }
-    let majority = 10 * mirrored >= 9 * count;
+    };
+    let majority = 10 * mirrored.len() >= 9 * count;
     ensure!(
-        majority || 10 * mirrored <= count,
-        "{mirrored} of {count} matrices are mirrored (determinant -1), beginning with {}; expected all or \
+        majority || 10 * mirrored.len() <= count,
+        "{} of {count} matrices are mirrored (determinant -1), beginning with {}; expected all or \
          none, with the columns right, up, back; export the cameras by one rule",
-        entries.iter().find(|entry| is_mirrored(entry)).map_or("", |entry| &entry.label)
+        mirrored.len(),
+        first.label
     );
-    leave_out(entries, !majority, notes);
+    leave_out(&all, !majority, notes);
+    listings.iter_mut().for_each(|listing| listing.frames.retain(|entry| is_mirrored(entry) == majority));
     if !majority {
         return Ok(());
     }
-    let agreement = Convergence::of(entries);
+    let entries = || listings.iter().flat_map(|listing| &listing.frames);
+    let agreement = Convergence::of(&entries().collect::<Vec<_>>());
     if agreement.is_some_and(|axes| axes.in_front >= 0.8 && axes.miss < axes.distance) {
-        for entry in entries {
+        for entry in listings.iter_mut().flat_map(|listing| &mut listing.frames) {
             entry.world_from_camera.matrix3.z_axis *= -1.0;
         }
         notes.warn(
@@ -50,8 +54,8 @@ fn is_mirrored(entry: &Entry) -> bool {
     entry.world_from_camera.matrix3.determinant() < 0.0
 }
 
-/// Drops the few frames that differ from the others.
-fn leave_out(entries: &mut Vec<Entry>, mirrored: bool, notes: &mut Notes) {
+/// Names the few frames that differ from the others, and so are dropped.
+fn leave_out(entries: &[&Entry], mirrored: bool, notes: &mut Notes) {
     let odd: Vec<&str> =
         entries.iter().filter(|e| is_mirrored(e) == mirrored).map(|e| e.label.as_str()).collect();
     if odd.is_empty() {
@@ -65,15 +69,14 @@ fn leave_out(entries: &mut Vec<Entry>, mirrored: bool, notes: &mut Notes) {
         "{} of the frames {handed}, unlike the others, and left out: {named}{more}; export them again",
         odd.len()
     ));
-    entries.retain(|entry| is_mirrored(entry) != mirrored);
 }
 
 /// Cameras that look away from one point may look the wrong way.
-fn remark_on_axes(entries: &[Entry], notes: &mut Notes) {
-    let Some(axes) = Convergence::of(entries) else {
+fn remark_on_axes(count: usize, agreement: Option<Convergence>, notes: &mut Notes) {
+    let Some(axes) = agreement else {
         return;
     };
-    if entries.len() >= 8 && axes.in_front >= 0.95 && axes.miss < 0.3 * axes.distance {
+    if count >= 8 && axes.in_front >= 0.95 && axes.miss < 0.3 * axes.distance {
         notes.note(
             "the cameras look away from the point that their axes meet in; if they should look at it, the \
              matrices are in OpenCV's axes, and their second and third columns need the opposite sign",
@@ -95,7 +98,7 @@ struct Convergence {
 impl Convergence {
     /// `None` for fewer than three cameras, where the axes are too parallel to meet, and for cameras that
     /// look everywhere.
-    fn of(entries: &[Entry]) -> Option<Self> {
+    fn of(entries: &[&Entry]) -> Option<Self> {
         let poses = || entries.iter().map(|entry| entry.world_from_camera);
         let count = entries.len() as f64;
         let across = |pose: DAffine3| {
@@ -123,10 +126,14 @@ impl Convergence {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::transforms::{Listing, parse};
+    use crate::dataset::transforms::{parse, parse_alone};
 
     /// Cameras on a circle whose third column points along `outward` times the way out.
     fn ring(count: u32, outward: f64, mirrored: impl Fn(u32) -> bool) -> Result<Listing> {
+        parse(&file(count, outward, mirrored))
+    }
+
+    fn file(count: u32, outward: f64, mirrored: impl Fn(u32) -> bool) -> String {
         let frame = |index: u32| {
             let (sin, cos) = (std::f64::consts::TAU * f64::from(index) / f64::from(count)).sin_cos();
             let (bx, by) = (outward * cos, outward * sin);
@@ -143,7 +150,7 @@ mod tests {
             )
         };
         let frames: Vec<_> = (0..count).map(frame).collect();
-        parse(&format!("{{\"fl_x\": 9, \"frames\": [{}]}}", frames.join(",")))
+        format!("{{\"fl_x\": 9, \"frames\": [{}]}}", frames.join(","))
     }
 
     fn messages(listing: Listing) -> String {
@@ -200,5 +207,16 @@ mod tests {
         assert_eq!(listing.frames.len(), 19);
         let message = ring(20, 1.0, |index| index < 5).expect_err("refused").to_string();
         assert!(message.contains("5 of 20 matrices are mirrored"), "{message}");
+    }
+
+    /// Two test cameras do not tell by themselves which way they look.
+    #[test]
+    fn files_of_one_dataset_are_read_alike() {
+        let read = |count| parse_alone(&file(count, -1.0, |_| true)).expect("valid");
+        let mut listings = [read(12), read(2)];
+        settle(&mut listings, &mut Notes::default()).expect("one rule");
+        assert!(listings.iter().flat_map(|listing| &listing.frames).all(|entry| !is_mirrored(entry)));
+        let alone = ring(2, -1.0, |_| true).expect("valid");
+        assert!(alone.frames.iter().all(is_mirrored));
     }
 }
