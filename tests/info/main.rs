@@ -1,124 +1,16 @@
 //! `nerf info`: healthy datasets raise no alarm, and each kind of damage is named with what to do.
 
+#[path = "../shared/mod.rs"]
 mod shared;
+mod toys;
 
-use assert_cmd::Command;
 use image::GenericImageView;
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 use serde_json::{Value, json};
 use shared::shared;
 use std::fs;
-use std::path::{Path, PathBuf};
-use tempfile::TempDir;
-
-fn nerf() -> Command {
-    assert_cmd::cargo::cargo_bin_cmd!("nerf")
-}
-
-/// A generated dataset to damage.
-struct Toys {
-    folder: TempDir,
-}
-
-impl Toys {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let out = folder.path().join("toys");
-        let scene =
-            ["generate", "toys", "--views", "24", "--size", "64", "--samples", "1", "--quiet", "--out"];
-        nerf().args(scene).arg(&out).assert().success();
-        Self { folder }
-    }
-
-    fn path(&self) -> PathBuf {
-        self.folder.path().join("toys")
-    }
-
-    fn photo(&self, index: usize) -> PathBuf {
-        self.path().join(format!("train/{index:04}.png"))
-    }
-
-    /// Changes one of the files.
-    fn edit(&self, split: &str, change: impl FnOnce(&mut Value)) {
-        let path = self.path().join(format!("transforms_{split}.json"));
-        let mut file: Value =
-            serde_json::from_str(&fs::read_to_string(&path).expect("readable")).expect("JSON");
-        change(&mut file);
-        fs::write(path, file.to_string()).expect("writable");
-    }
-
-    /// Changes every matrix.
-    fn edit_matrices(&self, change: impl Fn(&mut Value)) {
-        for split in ["train", "val", "test"] {
-            self.edit(split, |file| {
-                let frames = file["frames"].as_array_mut().expect("a list");
-                frames.iter_mut().for_each(|frame| change(&mut frame["transform_matrix"]));
-            });
-        }
-    }
-
-    /// Changes a training photo.
-    fn edit_photo(&self, index: usize, change: impl FnOnce(image::DynamicImage) -> image::DynamicImage) {
-        let path = self.photo(index);
-        change(image::open(&path).expect("readable")).save(&path).expect("writable");
-    }
-
-    fn info(&self) -> Result {
-        info(&self.path(), &[])
-    }
-}
-
-/// What `nerf info --json` said.
-struct Result {
-    json: Value,
-    code: i32,
-    stderr: String,
-}
-
-fn info(path: &Path, args: &[&str]) -> Result {
-    let output = nerf().args(["info", "--json"]).args(args).arg(path).output().expect("runs");
-    let stderr = String::from_utf8(output.stderr).expect("text");
-    assert!(!stderr.contains("panicked"), "{stderr}");
-    let json = serde_json::from_slice(&output.stdout).expect("one JSON object");
-    Result { json, code: output.status.code().expect("no signal"), stderr }
-}
-
-impl Result {
-    fn of_severity(&self, severity: &str) -> Vec<&str> {
-        let problems = self.json["problems"].as_array().expect("a list").iter();
-        let problems = problems.filter(|problem| problem["severity"] == severity);
-        problems.map(|problem| problem["message"].as_str().expect("a text")).collect()
-    }
-
-    /// Expects the exit code and a problem of the severity with all of `parts`, about the frames.
-    fn expect(&self, code: i32, severity: &str, parts: &[&str], frames: &[&str]) {
-        assert_eq!(self.code, code, "{:#} {}", self.json["problems"], self.stderr);
-        let problems = self.json["problems"].as_array().expect("a list").iter();
-        let is_meant = |problem: &&Value| {
-            let message = problem["message"].as_str().expect("a text");
-            problem["severity"] == severity && parts.iter().all(|part| message.contains(part))
-        };
-        let found = { problems }.find(is_meant);
-        let found = found.unwrap_or_else(|| panic!("no {severity} {parts:?} in {:#}", self.json["problems"]));
-        if !frames.is_empty() {
-            assert_eq!(found["frames"], json!(frames), "{found:#}");
-        }
-    }
-
-    fn expect_no_alarm(&self) {
-        assert_eq!(self.code, 0, "{}", self.stderr);
-        assert_eq!(self.of_severity("error"), [""; 0]);
-        assert_eq!(self.of_severity("warning"), [""; 0]);
-    }
-}
-
-/// Multiplies column `column` of a matrix.
-fn scale_column(matrix: &mut Value, column: usize, factor: f64) {
-    for row in 0..3 {
-        matrix[row][column] = json!(matrix[row][column].as_f64().expect("a number") * factor);
-    }
-}
+use toys::{Toys, info, nerf, scale_column};
 
 #[test]
 fn a_healthy_dataset_is_told_in_full() {
