@@ -3,6 +3,7 @@
 pub(crate) mod bench;
 pub(crate) mod check;
 pub(crate) mod generate;
+pub(crate) mod info;
 pub(crate) mod reading;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -54,6 +55,8 @@ pub(crate) enum Command {
     Eval(Eval),
     /// Write the page about a training: curves, test views, settings
     Report(Report),
+    /// Look at a dataset before training on it: what was read, what was assumed, what is wrong
+    Info(info::Info),
     /// Write an analytic scene with exact ground truth as a dataset
     Generate(generate::Generate),
     /// Measure error against run time

@@ -7,6 +7,7 @@ mod eval;
 mod exam;
 mod field;
 mod generate;
+mod info;
 mod render;
 mod report;
 mod scores;
@@ -33,6 +34,7 @@ pub(crate) fn run(cli: &Cli) -> Result<()> {
         Command::Render(args) => render::run(args, &session),
         Command::Eval(args) => eval::run(args, &session),
         Command::Report(args) => report::run(args, &session),
+        Command::Info(args) => info::run(args, &session),
         Command::Generate(args) => generate::run(args, &session),
         Command::Bench(what) => bench::run(what, &session),
         Command::Check(args) => check::run(args, &session),

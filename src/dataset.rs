@@ -4,7 +4,7 @@
 //! dataset's own, in its own units.
 
 mod bounds;
-mod focus;
+pub(crate) mod focus;
 mod frames;
 mod intrinsics;
 mod json;
@@ -40,6 +40,8 @@ pub use splits::HoldOut;
 pub struct Dataset {
     /// Folder that the images are named from.
     pub root: PathBuf,
+    /// The files that were read, the training frames' first.
+    pub files: Vec<PathBuf>,
     /// Which family of tools wrote it.
     pub dialect: String,
     /// The frames whose images are present (all listed ones where

@@ -160,28 +160,64 @@ pub struct Plan {
     pub chunks: usize,
 }
 
+/// What a plan depends on of an adapter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Traits {
+    /// It runs on the CPU.
+    pub is_cpu: bool,
+    /// It adds floats atomically.
+    pub float_atomics: bool,
+    /// It has subgroups of a multiple of 8 threads.
+    pub subgroups_of_8: bool,
+    /// Where its tensors are fast.
+    pub memory: Memory,
+}
+
+impl Traits {
+    /// A usual GPU.
+    pub const GPU: Self =
+        Self { is_cpu: false, float_atomics: true, subgroups_of_8: true, memory: Memory::Buffers };
+
+    /// Those of an adapter.
+    #[must_use]
+    pub fn of(gpu: &Gpu) -> Self {
+        Self {
+            is_cpu: gpu.is_cpu(),
+            float_atomics: gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC),
+            subgroups_of_8: gpu.has_subgroups_of(8),
+            memory: gpu.fast_memory(),
+        }
+    }
+}
+
 impl Plan {
     /// Chooses what depends on the adapter.
     #[must_use]
     pub fn new(gpu: &Gpu, config: Config, layout: Layout, needs: Needs) -> Self {
-        let orders = gpu.is_cpu() && marching::kept_capacity(&config.batch) <= LONGEST_LOOP;
+        Self::suited_to(Traits::of(gpu), config, layout, needs)
+    }
+
+    /// As [`Plan::new`], for an adapter that need not be there.
+    #[must_use]
+    pub fn suited_to(adapter: Traits, config: Config, layout: Layout, needs: Needs) -> Self {
+        let orders = adapter.is_cpu && marching::kept_capacity(&config.batch) <= LONGEST_LOOP;
         let accumulation = match config.accumulation {
-            Accumulation::Ordered if gpu.is_cpu() && !orders => Accumulation::Fixed,
+            Accumulation::Ordered if adapter.is_cpu && !orders => Accumulation::Fixed,
             Accumulation::Auto if orders => Accumulation::Ordered,
             Accumulation::Auto if config.deterministic => Accumulation::Fixed,
-            Accumulation::Auto if gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC) => Accumulation::Float,
+            Accumulation::Auto if adapter.float_atomics => Accumulation::Float,
             Accumulation::Auto => Accumulation::Exchange,
             chosen => chosen,
         };
-        let shared_weights = gpu.is_cpu() && gpu.has_subgroups_of(8);
-        let rows = match (gpu.is_cpu(), shared_weights) {
+        let shared_weights = adapter.is_cpu && adapter.subgroups_of_8;
+        let rows = match (adapter.is_cpu, shared_weights) {
             (true, true) => 4,
             (true, false) => 4,
             (false, _) => 2,
         };
-        let chunks = if gpu.is_cpu() { 32 } else { 512 };
+        let chunks = if adapter.is_cpu { 32 } else { 512 };
         let product = layer::Product { rows, shared_weights };
-        Self { config, layout, needs, product, accumulation, memory: gpu.fast_memory(), chunks }
+        Self { config, layout, needs, product, accumulation, memory: adapter.memory, chunks }
     }
 
     /// The smallest step in box units.

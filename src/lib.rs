@@ -72,6 +72,7 @@ pub mod config;
 pub mod dataset;
 pub mod file;
 pub mod gpu;
+pub mod health;
 pub mod image;
 pub mod kernels;
 pub mod memory;

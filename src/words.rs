@@ -1,5 +1,7 @@
 //! Numbers as people say them.
 
+use glam::DVec3;
+
 /// A duration as people say it.
 #[must_use]
 pub fn duration(seconds: f64) -> String {
@@ -35,6 +37,43 @@ pub fn bytes(count: u64) -> String {
     format!("{value:.digits$} {}", UNITS[unit])
 }
 
+/// A length with three or four digits, in plain figures where that is short.
+#[must_use]
+pub fn length(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-3..1e6).contains(&size) {
+        return format!("{value:.2e}");
+    }
+    if size == 0.0 {
+        return "0".to_owned();
+    }
+    // Small numbers are shown with three digits, as those below them are with three decimals.
+    let power = size.log10().floor();
+    let decimals = if power < -1.0 { 2.0 - power } else { (3.0 - power).clamp(0.0, 3.0) };
+    format!("{value:.*}", decimals as usize)
+}
+
+/// A point; what is nothing on the scale of its surroundings is 0.
+#[must_use]
+pub fn point(at: DVec3, scale: f64) -> String {
+    let [x, y, z] = at.to_array().map(|value| length(if value.abs() < 1e-4 * scale { 0.0 } else { value }));
+    format!("({x}, {y}, {z})")
+}
+
+/// A part of a whole.
+#[must_use]
+pub fn percent(part: f64) -> String {
+    let percent = 100.0 * part;
+    let digits = usize::from((0.05..9.95).contains(&percent));
+    format!("{percent:.digits$} %")
+}
+
+/// `1 frame`, `2 frames`.
+#[must_use]
+pub fn count(number: usize, thing: &str) -> String {
+    if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -46,5 +85,10 @@ mod tests {
         assert_eq!([7.0, 1234.0, 5.67e6].map(short), ["7", "1.2k", "5.7M"]);
         let memory = [7, 1536, 400 << 20, 8_294_400_000].map(bytes);
         assert_eq!(memory, ["7 bytes", "1.5 KiB", "400 MiB", "7.7 GiB"]);
+        let lengths = [0.0, 1e-9, -0.04321, 1.5, -23.456, 123456.7, 2e7].map(length);
+        assert_eq!(lengths, ["0", "1.00e-9", "-0.0432", "1.500", "-23.46", "123457", "2.00e7"]);
+        assert_eq!(point(DVec3::new(1e-9, -2.0, 0.5), 4.0), "(0, -2.000, 0.500)");
+        assert_eq!([0.0, 0.0001, 0.012, 0.5, 1.0].map(percent), ["0 %", "0 %", "1.2 %", "50 %", "100 %"]);
+        assert_eq!([count(1, "frame"), count(3, "frame")], ["1 frame", "3 frames"]);
     }
 }

@@ -39,7 +39,7 @@ fn fails(folder: &Path, args: &[&str], code: i32, parts: &[&str]) {
 #[test]
 fn help_names_every_command_and_version_is_told() {
     let mut help = nerf().arg("--help").assert().success();
-    for command in ["train", "render", "eval", "report", "generate", "bench", "check", "adapters"] {
+    for command in ["train", "render", "eval", "report", "info", "generate", "bench", "check", "adapters"] {
         help = help.stdout(contains(command));
         nerf().args([command, "--help"]).assert().success().stdout(contains("--adapter"));
     }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::focus::{Axis, Focus, FocusKind, find, median};
 use super::notes::Notes;
 use super::transforms::SceneBox;
-use crate::camera::Camera;
+use crate::camera::{Camera, Ray};
 
 /// The scene box, in world space: an inner cube that holds the subject, doubled about its centre
 /// `cascades - 1` times to take in the background.
@@ -110,8 +110,14 @@ impl Bounds {
     }
 
     fn is_hit_by(&self, axis: &Axis) -> bool {
-        let inverse = axis.direction.recip();
-        let (a, b) = ((self.min() - axis.origin) * inverse, (self.max() - axis.origin) * inverse);
+        self.meets(self.outer_half(), &Ray { origin: axis.origin, direction: axis.direction })
+    }
+
+    /// Whether a ray meets the cube of this half side about the centre.
+    pub(crate) fn meets(&self, half: f64, ray: &Ray) -> bool {
+        let inverse = ray.direction.recip();
+        let middle = self.center - ray.origin;
+        let (a, b) = ((middle - half) * inverse, (middle + half) * inverse);
         a.max(b).min_element() > a.min(b).max_element().max(0.0)
     }
 

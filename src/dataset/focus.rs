@@ -6,10 +6,10 @@ use crate::camera::{Camera, Lens, LensKind};
 
 /// What matters about a camera here, in world space.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Axis {
-    pub(super) origin: DVec3,
+pub(crate) struct Axis {
+    pub(crate) origin: DVec3,
     /// Unit direction through the middle of the image.
-    pub(super) direction: DVec3,
+    pub(crate) direction: DVec3,
     /// Half the larger side of the view at the camera itself, in world units; 0 but for parallel rays.
     half_width: f64,
     /// Tangent of half the larger field of view.
@@ -20,7 +20,7 @@ pub(super) struct Axis {
 const WIDEST_TANGENT: f64 = 1.0;
 
 impl Axis {
-    pub(super) fn of(camera: &Camera) -> Self {
+    pub(crate) fn of(camera: &Camera) -> Self {
         let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
         let middle = camera.ray(0.5 * size);
         let half = (0.5 * size / camera.focal_px).max_element();
@@ -38,18 +38,18 @@ impl Axis {
     }
 
     /// Half the larger side of the view at a distance, in world units.
-    pub(super) fn half_width_at(&self, distance: f64) -> f64 {
+    pub(crate) fn half_width_at(&self, distance: f64) -> f64 {
         self.half_width + distance * self.tan_half
     }
 
     /// Distance along the axis, and away from it.
-    fn along_and_across(&self, point: DVec3) -> (f64, f64) {
+    pub(crate) fn along_and_across(&self, point: DVec3) -> (f64, f64) {
         let to_point = point - self.origin;
         let along = to_point.dot(self.direction);
         (along, (to_point - along * self.direction).length())
     }
 
-    fn sees(&self, point: DVec3) -> bool {
+    pub(crate) fn sees(&self, point: DVec3) -> bool {
         let (along, across) = self.along_and_across(point);
         along > 0.0 && across <= self.half_width_at(along)
     }
@@ -57,15 +57,15 @@ impl Axis {
 
 /// The point a set of cameras looks at.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Focus {
-    pub(super) point: DVec3,
+pub(crate) struct Focus {
+    pub(crate) point: DVec3,
     /// Typical distance between a camera and what it looks at, above 0.
-    pub(super) distance: f64,
-    pub(super) kind: FocusKind,
+    pub(crate) distance: f64,
+    pub(crate) kind: FocusKind,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum FocusKind {
+pub(crate) enum FocusKind {
     /// The axes meet.
     Crossing,
     /// The axes do not tell, but the world's origin is in view.
@@ -77,7 +77,7 @@ pub(super) enum FocusKind {
 }
 
 /// Finds the focus of at least one axis.
-pub(super) fn find(axes: &[Axis]) -> Focus {
+pub(crate) fn find(axes: &[Axis]) -> Focus {
     let mean = axes.iter().map(|axis| axis.origin).sum::<DVec3>() / axes.len() as f64;
     let spread = axes.iter().map(|axis| axis.origin.distance(mean));
     let spread = spread.fold(0.0, f64::max);
@@ -168,7 +168,7 @@ fn ahead(axes: &[Axis], mean: DVec3, heading: DVec3) -> Focus {
 }
 
 /// The middle value, the upper one of two; not a number for none.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

@@ -64,6 +64,7 @@ impl Dataset {
         let bounds = Bounds::choose(&cameras, scene_box, surroundings, &mut notes);
         Ok(Self {
             root,
+            files: sources.into_iter().map(|(_, path)| path).collect(),
             dialect: dialect.to_owned(),
             frames,
             train: splits.train,

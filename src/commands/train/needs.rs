@@ -15,6 +15,14 @@ const PHOTOS_FOR_GREY: usize = 8;
 /// # Errors
 /// When photos cannot be read, or are no use to what `config` asks for.
 pub(in crate::commands) fn of(dataset: &Dataset, config: &Config) -> Result<Needs> {
+    Ok(Needs { grey: grey(dataset)?, ..of_headers(dataset, config)? })
+}
+
+/// As [`of`], without looking at photos: their brightness is taken for 1.
+///
+/// # Errors
+/// When `config` asks for what the photos do not have.
+pub(in crate::commands) fn of_headers(dataset: &Dataset, config: &Config) -> Result<Needs> {
     let used = dataset.train.iter().chain(&dataset.test);
     Ok(Needs {
         lenses: LensKind::among(used.map(|&index| &dataset.frames[index].camera)),
@@ -23,7 +31,7 @@ pub(in crate::commands) fn of(dataset: &Dataset, config: &Config) -> Result<Need
         deep: dataset.bit_depth == BitDepth::Sixteen,
         masks: trains_on(dataset, |frame| frame.has_mask),
         depth: trains_on_depth(dataset, config)?,
-        grey: grey(dataset)?,
+        grey: 1.0,
         cascades: dataset.bounds.cascades,
         cameras: dataset.train.len(),
     })

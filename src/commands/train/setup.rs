@@ -117,7 +117,8 @@ impl Setup {
     }
 }
 
-fn cameras(dataset: &Dataset, indices: &[usize]) -> Vec<Camera> {
+/// The cameras of some frames.
+pub(in crate::commands) fn cameras(dataset: &Dataset, indices: &[usize]) -> Vec<Camera> {
     indices.iter().map(|&index| dataset.frames[index].camera.clone()).collect()
 }
 
@@ -136,9 +137,14 @@ fn configure(mut config: Config, wishes: &Wishes<'_>) -> Result<Config> {
     Ok(config)
 }
 
+/// The settings when nothing is said.
+pub(in crate::commands) fn defaults(is_cpu: bool, dataset: &Dataset) -> Result<Config> {
+    if is_cpu { Config::for_cpu(dataset.bounds.cascades > 1) } else { Ok(Config::default()) }
+}
+
 fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
     let bounds = dataset.bounds.clone();
-    let defaults = if gpu.is_cpu() { Config::for_cpu(bounds.cascades > 1)? } else { Config::default() };
+    let defaults = defaults(gpu.is_cpu(), dataset)?;
     let mut config = configure(defaults, wishes)?;
     let cameras = cameras(dataset, &dataset.train);
     if config.grid.finest == 0 {

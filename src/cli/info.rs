@@ -1,0 +1,33 @@
+//! What `nerf info` takes.
+
+use super::reading::Reading;
+use clap::Args;
+use nerf::dataset::HoldOut;
+use std::path::PathBuf;
+
+/// `nerf info`
+#[derive(Args, Debug)]
+pub(crate) struct Info {
+    /// A folder with transforms.json or transforms_train.json, or such a file
+    pub(crate) dataset: PathBuf,
+    /// Draw the cameras from above and from the side, to a .svg or .png file
+    #[arg(long, value_name = "FILE", value_parser = picture)]
+    pub(crate) plot: Option<PathBuf>,
+    /// Do not decode the photos to look for blurred, dark, bright and repeated ones
+    #[arg(long)]
+    pub(crate) no_photos: bool,
+    /// Without a test split, keep every N-th frame for testing, or none
+    #[arg(long, value_name = "N|none", default_value = "8", value_parser = super::hold_out)]
+    pub(crate) hold_out: HoldOut,
+    /// How photos are read.
+    #[command(flatten)]
+    pub(crate) reading: Reading,
+}
+
+fn picture(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_known = path
+        .extension()
+        .is_some_and(|end| ["svg", "png"].iter().any(|known| end.eq_ignore_ascii_case(known)));
+    is_known.then_some(path).ok_or_else(|| "expected a file name that ends in .svg or .png".to_owned())
+}

@@ -1,0 +1,127 @@
+//! `nerf info`: what a training would make of a dataset, before it takes a night.
+
+mod memory;
+mod page;
+mod problems;
+mod result;
+
+use super::{Failed, Session};
+use crate::cli::info::Info;
+use crate::progress::Progress;
+use anyhow::Result;
+use memory::Estimate;
+use nerf::dataset::{Dataset, OpenOptions, Reading};
+use nerf::file::write_atomically;
+use nerf::health::map::{self, Drawing};
+use nerf::health::photos::{Gallery, Look};
+use nerf::health::{Finding, Severity, Survey};
+use nerf::image::write_png_rgba8;
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Pixels of a PNG along a unit of the drawing.
+const PIXELS_PER_UNIT: f32 = 1.5;
+
+/// All there is to say about a dataset.
+#[derive(Debug)]
+struct Report<'a> {
+    args: &'a Info,
+    dataset: &'a Dataset,
+    survey: Survey,
+    /// `None` where the photos were not looked at.
+    gallery: Option<Gallery>,
+    /// `None` where there is nothing to train on.
+    memory: Option<Estimate>,
+    /// Worst first.
+    problems: Vec<Finding>,
+}
+
+pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
+    let options = OpenOptions {
+        hold_out: args.hold_out,
+        allow_missing: true,
+        reading: args.reading.over(Reading::default()),
+    };
+    let dataset = match Dataset::open(&args.dataset, &options) {
+        Ok(dataset) => dataset,
+        Err(error) => return unreadable(args, &format!("{error:#}"), session),
+    };
+    let mut report = inspect(args, &dataset, session)?;
+    if let Some(path) = &args.plot {
+        let marked = (report.problems.iter().filter(|problem| problem.severity != Severity::Note))
+            .flat_map(|problem| problem.frames.iter().copied());
+        plot(path, &map::draw(&dataset, &report.survey, &marked.collect()))?;
+    }
+    report.problems.sort_by_key(|problem| problem.severity);
+    session.print(&report.json(), &report.text())?;
+    match report.problems.first().filter(|problem| problem.severity == Severity::Error) {
+        Some(problem) => Err(Failed(format!("a training would fail: {}", problem.message)).into()),
+        None => Ok(()),
+    }
+}
+
+/// Looks at cameras, photos and memory.
+fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> Result<Report<'a>> {
+    let survey = Survey::of(dataset);
+    let mut problems = problems::of_dataset(dataset);
+    problems.extend(survey.findings.iter().cloned());
+    let mut gallery = None;
+    if !args.no_photos && problems::found(dataset) > 0 {
+        let (all, failures) = look(dataset, &survey.views, session);
+        problems.extend(failures);
+        gallery = Some(all);
+    }
+    problems.extend(survey.findings_with(gallery.as_ref(), dataset));
+    let mut memory = None;
+    if !dataset.train.is_empty() {
+        let estimate = Estimate::of(dataset, session)?;
+        problems.extend(estimate.problems());
+        memory = Some(estimate);
+    }
+    Ok(Report { args, dataset, survey, gallery, memory, problems })
+}
+
+/// Decodes all photos, in parallel, and keeps what matters of each.
+fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, Vec<Finding>) {
+    let progress = Progress::new(session.remarks, "looking");
+    let done = AtomicUsize::new(0);
+    let looks: Vec<_> = (views.par_iter())
+        .map(|&index| {
+            let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
+            progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
+            look.map_err(|error| Finding::error(format!("{error:#}")).about(vec![index]))
+        })
+        .collect();
+    let (looks, failures): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);
+    let looks = looks.into_iter().filter_map(Result::ok).collect();
+    (Gallery { looks }, failures.into_iter().filter_map(Result::err).collect())
+}
+
+fn plot(path: &Path, drawing: &Drawing) -> Result<()> {
+    if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")) {
+        let picture = drawing.pixels(PIXELS_PER_UNIT)?;
+        return write_png_rgba8(path, picture.width, picture.height, &picture.pixels);
+    }
+    write_atomically(path, |file| Ok(file.write_all(drawing.svg().as_bytes())?))
+}
+
+/// The result for what cannot even be opened.
+fn unreadable(args: &Info, message: &str, session: &Session<'_>) -> Result<()> {
+    let result = json!({
+        "dataset": args.dataset.display().to_string(),
+        "ok": false,
+        "dialect": Value::Null,
+        "frames": 0,
+        "found": 0,
+        "cameras": 0,
+        "box": Value::Null,
+        "memory": Value::Null,
+        "problems": [{ "severity": Severity::Error, "message": message }],
+        "error": message,
+    });
+    session.print(&result, &format!("error    {message}"))?;
+    Err(Failed(message.to_owned()).into())
+}

@@ -1,0 +1,40 @@
+//! What is wrong with a dataset as it was read.
+
+use nerf::dataset::Dataset;
+use nerf::health::Finding;
+
+/// Number of images that are there.
+pub(super) fn found(dataset: &Dataset) -> usize {
+    dataset.listed - dataset.missing.len()
+}
+
+/// What keeps a training from beginning, and what the reader remarked.
+pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Finding> {
+    let mut problems = Vec::new();
+    if found(dataset) == 0 {
+        problems.push(Finding::error(nothing_found(dataset)));
+    } else if dataset.train.is_empty() {
+        problems.push(Finding::error(
+            "there is no frame to train on: every frame is in the test or validation split; name the folder or the \
+             file that lists the training frames",
+        ));
+    }
+    let all_missing = format!("{} of {} listed images are missing", dataset.listed, dataset.listed);
+    let notes = dataset.notes.iter().filter(|note| {
+        // Said above; and the survey says which axes are meant, and how that was seen.
+        !note.message.starts_with(&all_missing) && !note.message.starts_with("the cameras look away from")
+    });
+    problems.extend(notes.map(Finding::from));
+    problems
+}
+
+fn nothing_found(dataset: &Dataset) -> String {
+    let few: Vec<_> = dataset.missing.iter().take(3).map(String::as_str).collect();
+    let more = if dataset.missing.len() > few.len() { ", …" } else { "" };
+    format!(
+        "none of the {} listed images is there: {}{more} in {}; put the images where `file_path` says",
+        dataset.listed,
+        few.join(", "),
+        dataset.root.display()
+    )
+}
