@@ -18,6 +18,7 @@ use course::{Course, End};
 use folder::RunFolder;
 use nerf::checkpoint::About;
 use nerf::dataset::{Dataset, OpenOptions};
+use nerf::health::{Severity, Survey};
 use nerf::report::views::TestViews;
 use nerf::schedule::Budget;
 use nerf::train::Trainer;
@@ -36,6 +37,10 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let options = OpenOptions { hold_out: args.hold_out, reading, ..OpenOptions::default() };
     let dataset = Dataset::open(&args.dataset, &options)?;
     session.remarks.notes(&dataset);
+    let findings = Survey::of(&dataset).findings;
+    for finding in findings.iter().filter(|finding| finding.severity < Severity::Note) {
+        session.remarks.warn(&finding.message);
+    }
     let gpu = session.open_gpu()?;
     let wishes = Wishes {
         dataset: &args.dataset.display().to_string(),

@@ -98,7 +98,6 @@ impl Present {
             return Ok(Self { listed, missing, located: present.collect() });
         }
         ensure!(options.allow_missing, "{message}; put the images where `file_path` says, as {FORMATS}");
-        notes.warn(message);
         Ok(Self { listed, missing, located })
     }
 

@@ -13,9 +13,8 @@ use crate::dataset::transforms::{Entry, Listing};
 pub(in crate::dataset) fn settle(listings: &mut [Listing], notes: &mut Notes) -> Result<()> {
     let all: Vec<&Entry> = listings.iter().flat_map(|listing| &listing.frames).collect();
     let mirrored: Vec<&&Entry> = all.iter().filter(|entry| is_mirrored(entry)).collect();
-    let (count, agreement) = (all.len(), Convergence::of(&all));
+    let count = all.len();
     let Some(first) = mirrored.first() else {
-        remark_on_axes(count, agreement, notes);
         return Ok(());
     };
     let majority = 10 * mirrored.len() >= 9 * count;
@@ -69,19 +68,6 @@ fn leave_out(entries: &[&Entry], mirrored: bool, notes: &mut Notes) {
         "{} of the frames {handed}, unlike the others, and left out: {named}{more}; export them again",
         odd.len()
     ));
-}
-
-/// Cameras that look away from one point may look the wrong way.
-fn remark_on_axes(count: usize, agreement: Option<Convergence>, notes: &mut Notes) {
-    let Some(axes) = agreement else {
-        return;
-    };
-    if count >= 8 && axes.in_front >= 0.95 && axes.miss < 0.3 * axes.distance {
-        notes.note(
-            "the cameras look away from the point that their axes meet in; if they should look at it, the \
-             matrices are in OpenCV's axes, and their second and third columns need the opposite sign",
-        );
-    }
 }
 
 /// How the third columns of the poses meet.
@@ -162,7 +148,7 @@ mod tests {
         let listing = ring(12, 1.0, |_| false).expect("valid");
         assert!(listing.frames.iter().all(|entry| !is_mirrored(entry)));
         assert_eq!(messages(listing), "");
-        assert!(messages(ring(12, -1.0, |_| false).expect("valid")).contains("look away"));
+        assert_eq!(messages(ring(12, -1.0, |_| false).expect("valid")), "");
     }
 
     #[test]
