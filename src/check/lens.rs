@@ -60,7 +60,7 @@ const LENSES: [Lens; 10] = [
     Lens::Fisheye { k: [-0.02, 0.003, -0.0004, 0.00002] },
     Lens::Fisheye { k: [-0.1, 0.0, 0.0, 0.0] },
     Lens::Fisheye { k: [-0.1, 0.08, -0.022, 0.0019] },
-    Lens::Fisheye { k: [0.2, 0.1, 0.02, 0.0] },
+    Lens::Fisheye { k: [0.1, 0.02, 0.0, 0.0] },
 ];
 /// Size and focal lengths, OpenCV's and the fisheye's, of the image that round trips cover, in pixels.
 const IMAGE: [f64; 2] = [1000.0, 750.0];
@@ -68,8 +68,11 @@ const FOCAL_PX: [f64; 2] = [810.0, 310.0];
 
 /// Points all over an image through the inverse of the lens and back through the reference's lens, in pixels.
 fn undistorted_points(subject: &Subject) -> Result<Tally> {
-    let mut tally =
-        Tally::new("lens: round trips, pixels", 1e-4, "a point on the plane rounds; 1000 pixels are across");
+    let mut tally = Tally::new(
+        "lens: round trips, pixels",
+        1e-4,
+        "points and angles round; the image is 1000 pixels wide",
+    );
     let body = "var camera: Camera;\n\
                 camera.radial = input(1u);\n\
                 camera.tangential = input(2u).xy;\n\
