@@ -7,7 +7,8 @@
 //! transforms.json + images ──> dataset ──> train ──> checkpoint ──> render ──> EXR, PNG, scores
 //! ```
 //!
-//! [`dataset`] reads cameras and images. [`train::Trainer`] owns the field on the device and takes steps: rays,
+//! [`dataset`] reads cameras and photos, [`health`] says what is wrong with them, and [`views::Views`] brings them to
+//! the device, where [`memory`] has said that there is room. [`train::Trainer`] owns the field on the device and takes steps: rays,
 //! march, density, selection, colour, the fused render·loss·gradient kernel, backward, Adam. [`checkpoint`]
 //! keeps a field on disk. [`render::Renderer`] shows it to any camera. The command line on top of it is the
 //! binary of this package.

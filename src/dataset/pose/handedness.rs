@@ -139,6 +139,11 @@ mod tests {
         format!("{{\"fl_x\": 9, \"frames\": [{}]}}", frames.join(","))
     }
 
+    fn looks_inwards(entry: &Entry) -> bool {
+        let pose = entry.world_from_camera;
+        pose.matrix3.z_axis.dot(pose.translation) > 3.0
+    }
+
     fn messages(listing: Listing) -> String {
         listing.notes.finish().iter().map(|note| format!("{note}\n")).collect()
     }
@@ -155,14 +160,7 @@ mod tests {
     fn a_left_handed_world_is_kept() {
         let listing = ring(12, 1.0, |_| true).expect("valid");
         assert!(listing.frames.iter().all(is_mirrored));
-        assert!(
-            listing.frames.iter().all(|e| e
-                .world_from_camera
-                .matrix3
-                .z_axis
-                .dot(e.world_from_camera.translation)
-                > 3.0)
-        );
+        assert!(listing.frames.iter().all(looks_inwards));
         assert!(messages(listing).contains("left-handed world"));
     }
 
@@ -170,14 +168,7 @@ mod tests {
     fn a_forward_axis_is_turned_round() {
         let listing = ring(12, -1.0, |_| true).expect("valid");
         assert!(listing.frames.iter().all(|entry| !is_mirrored(entry)));
-        assert!(
-            listing.frames.iter().all(|e| e
-                .world_from_camera
-                .matrix3
-                .z_axis
-                .dot(e.world_from_camera.translation)
-                > 3.0)
-        );
+        assert!(listing.frames.iter().all(looks_inwards));
         assert!(messages(listing).contains("right, up, forward"));
     }
 
