@@ -35,6 +35,16 @@ pub fn bytes(count: u64) -> String {
     format!("{value:.digits$} {}", UNITS[unit])
 }
 
+/// The first few of some names.
+#[must_use]
+pub fn few(names: &[impl AsRef<str>]) -> String {
+    let mut text = names.iter().take(3).map(AsRef::as_ref).collect::<Vec<_>>().join(", ");
+    if names.len() > 3 {
+        text += ", …";
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -46,5 +56,11 @@ mod tests {
         assert_eq!([7.0, 1234.0, 5.67e6].map(short), ["7", "1.2k", "5.7M"]);
         let memory = [7, 1536, 400 << 20, 8_294_400_000].map(bytes);
         assert_eq!(memory, ["7 bytes", "1.5 KiB", "400 MiB", "7.7 GiB"]);
+    }
+
+    #[test]
+    fn a_few_names_stand_for_many() {
+        assert_eq!([few(&["a"]), few(&["a", "b", "c"])], ["a", "a, b, c"]);
+        assert_eq!(few(&["a", "b", "c", "d"]), "a, b, c, …");
     }
 }
