@@ -18,7 +18,7 @@ use std::sync::LazyLock;
 
 /// Width and height of the datasets here.
 const SIZE: u32 = 48;
-/// With sides to be said in words.
+/// So many views in all splits, and that size.
 const SMALL: [&str; 4] = ["--views", "40", "--size", "48"];
 
 /// 33 views to train on and 5 to test on, with alpha and depth.
