@@ -141,7 +141,7 @@ pub enum ColorLoss {
     Auto,
     /// The squared error.
     Squared,
-    /// The squared error over the mean square of rendered and photographed colour.
+    /// The squared error over the rendered colour times the brighter of it and the photo's.
     Relative,
 }
 

@@ -134,7 +134,7 @@ impl Default for Needs {
     }
 }
 
-/// Added to the square of the colours that an error is relative to, as in tiny-cuda-nn's RelativeL2.
+/// Added to the squared colour that an error is relative to, as in tiny-cuda-nn's RelativeL2.
 pub const RELATIVE_FLOOR: f64 = 0.01;
 
 /// llvmpipe ends the loops of a thread after so many rounds together, without an error; ordered sums have one round

@@ -74,6 +74,16 @@ pub fn count(number: usize, thing: &str) -> String {
     if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
 }
 
+/// The first few of some names.
+#[must_use]
+pub fn few(names: &[impl AsRef<str>]) -> String {
+    let mut text = names.iter().take(3).map(AsRef::as_ref).collect::<Vec<_>>().join(", ");
+    if names.len() > 3 {
+        text += ", …";
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,5 +100,11 @@ mod tests {
         assert_eq!(point(DVec3::new(1e-9, -2.0, 0.5), 4.0), "(0, -2.000, 0.500)");
         assert_eq!([0.0, 0.0001, 0.012, 0.5, 1.0].map(percent), ["0 %", "0 %", "1.2 %", "50 %", "100 %"]);
         assert_eq!([count(1, "frame"), count(3, "frame")], ["1 frame", "3 frames"]);
+    }
+
+    #[test]
+    fn a_few_names_stand_for_many() {
+        assert_eq!([few(&["a"]), few(&["a", "b", "c"])], ["a", "a, b, c"]);
+        assert_eq!(few(&["a", "b", "c", "d"]), "a, b, c, …");
     }
 }

@@ -1,8 +1,9 @@
 //! Training, resuming, measuring and rendering from end to end, on whatever adapter there is.
 
-use assert_cmd::Command;
+mod driving;
+
+use driving::{SMOKE, checkpoint, folder, generated, nerf, number, object, rows, text, train};
 use nerf::camera::LensKind;
-use nerf::checkpoint::Checkpoint;
 use nerf::image::read_exr_channel;
 use nerf::kernels::training::STATE;
 use predicates::prelude::*;
@@ -15,60 +16,9 @@ use std::sync::LazyLock;
 /// In decibels. The smoke test reaches 27.6 on a CPU adapter. With a wrong factor in the density gradient it
 /// reached 20.1, with the background behind every sample 22.3, and without the gradient of the features 19.2.
 const GATE_DB: f64 = 25.5;
-const SMOKE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/smoke.json");
-
-fn nerf(args: &[&str]) -> Command {
-    let mut command = assert_cmd::cargo::cargo_bin_cmd!("nerf");
-    command.args(args).arg("--quiet");
-    command
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a path in UTF-8")
-}
-
-/// The JSON object that a command prints.
-fn object(args: &[&str]) -> Value {
-    let assert = nerf(args).arg("--json").assert().success();
-    serde_json::from_slice(&assert.get_output().stdout).expect("one JSON value")
-}
-
-/// An empty folder of this test run.
-fn folder(name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("training").join(name);
-    let _ = fs::remove_dir_all(&path);
-    fs::create_dir_all(path.parent().expect("has a parent")).expect("writable");
-    path
-}
-
-fn generated(scene: &str, name: &str, further: &[&str]) -> PathBuf {
-    let path = folder(name);
-    let args = [&["generate", scene, "--out", text(&path)], further].concat();
-    nerf(&args).assert().success();
-    path
-}
 
 static TOYS: LazyLock<PathBuf> =
     LazyLock::new(|| generated("toys", "toys", &["--views", "40", "--size", "60"]));
-
-/// Trains with the smoke preset and returns the folder and what was printed.
-fn train(dataset: &Path, run: &Path, further: &[&str]) -> Value {
-    let args = ["train", text(dataset), "--out", text(run), "--config", SMOKE];
-    object(&[&args, further].concat())
-}
-
-fn rows(run: &Path) -> Vec<Value> {
-    let log = fs::read_to_string(run.join("log.jsonl")).expect("a log");
-    log.lines().map(|line| serde_json::from_str(line).expect("a JSON object per line")).collect()
-}
-
-fn checkpoint(run: &Path) -> Checkpoint {
-    Checkpoint::load(&run.join("checkpoint.safetensors")).expect("a checkpoint")
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("expected a number, found {value}"))
-}
 
 #[test]
 fn a_short_training_learns_the_scene() {

@@ -9,6 +9,7 @@ use nerf::camera::LensKind;
 use nerf::dataset::{Dataset, Split};
 use nerf::image::write_png_rgba8;
 use nerf::picture::{ColorSpace, opaque_srgb8};
+use nerf::words::few;
 use serde_json::{Value, json};
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
@@ -75,11 +76,12 @@ fn frames(field: &Field, dataset: &Dataset, split: Split, session: &Session<'_>)
         ));
         return Ok(indices);
     }
-    if let Some(first) = missing.first() {
+    if !missing.is_empty() {
         session.remarks.warn(&format!(
-            "{} of {} {split:?} views of the training are missing in this dataset: {first}, …",
+            "{} of {} {split:?} views of the training are missing in this dataset: {}",
             missing.len(),
-            names.len()
+            names.len(),
+            few(&missing)
         ));
     }
     Ok(found)

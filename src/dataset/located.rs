@@ -14,6 +14,7 @@ use super::sidecars::{Finder, Sidecars};
 use super::transforms::{Entry, Listing};
 use super::{Frame, OpenOptions, Split, frames};
 use crate::image::{BitDepth, FORMATS, Header, Turn};
+use crate::words::few;
 
 /// A listed frame and what was found of it.
 pub(super) struct Located {
@@ -84,13 +85,11 @@ impl Present {
         if missing.is_empty() {
             return Ok(Self { listed, missing, located });
         }
-        let first: Vec<_> = missing.iter().take(3).map(String::as_str).collect();
-        let more = if missing.len() > 3 { ", …" } else { "" };
         let message = format!(
-            "{} of {listed} listed images are missing in {}: {}{more}",
+            "{} of {listed} listed images are missing in {}: {}",
             missing.len(),
             root.display(),
-            first.join(", ")
+            few(&missing)
         );
         if missing.len() < listed {
             notes.warn(format!("{message}; they are skipped"));

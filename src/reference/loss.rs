@@ -3,14 +3,16 @@
 //! ```text
 //! loss = 1/(4M) Σ_x v_x (R_x − g_x)²  +  λ/M D²        D = Σ_i w_i (t_i − g_t)
 //! v_x = 1                     squared, and always for the opacity
-//! v_x = 1 / ((R_x² + g_x²)/2 + 0.01)     relative; a constant as far as gradients go
+//! v_x = 1 / (R_x max(R_x, g_x) + 0.01)     relative; a constant as far as gradients go
 //! d_c_xi = v_x (R_x − g_x)/(2M) w_i
 //! d_s_i  = Σ_x v_x (R_x − g_x)/(2M) dR_x/ds_i  +  2λ/M D dD/ds_i
 //! ```
 //!
 //! The relative error follows Mildenhall et al. 2022 (RawNeRF, eq. 4), whose weight is `1/(R_x + ε)²`. With that, a
-//! pixel that the field does not show yet outweighs all others by its brightness squared; relative to both colours, an
-//! error is at most 2.
+//! pixel that the field does not show yet pulls with its brightness over the field's. Fields of linear light learn
+//! logarithms of colours, so what counts is the slope by `ln R_x`, `R_x v_x (R_x − g_x)/(2M)`: with the weight above
+//! it is near `±1/(2M)` from twice too bright to far too dark, and never beyond. A weight by the target's square would
+//! let the slope vanish like `R_x/g_x`: colours that have become dark would stay so.
 //!
 //! `D` is composited like a colour `t_i − g_t` over 0, so that the transparent part of a ray has no error, and its
 //! derivative is that of a colour.
@@ -18,7 +20,7 @@
 use super::Transmittance;
 use super::composite::{CompositeInput, CompositeOutput, composite, d_rendered_by_s};
 
-/// Added to the square of the colours that an error is relative to.
+/// Added to the squared colour that an error is relative to.
 pub const RELATIVE_FLOOR: f64 = 0.01;
 
 /// How errors count.
@@ -34,7 +36,7 @@ impl Loss {
     /// `v_x` of colour and opacity.
     pub fn weights(&self, rendered: [f64; 4], target: [f64; 4]) -> [f64; 4] {
         let weight = |x: usize| match self.is_relative && x < 3 {
-            true => 1.0 / (0.5 * (rendered[x] * rendered[x] + target[x] * target[x]) + RELATIVE_FLOOR),
+            true => 1.0 / (rendered[x] * rendered[x].max(target[x]) + RELATIVE_FLOOR),
             false => 1.0,
         };
         std::array::from_fn(weight)
@@ -140,6 +142,22 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// By the logarithm of the colour, whatever the photo's: at most 1, and hardly less for what is far too dark.
+    #[test]
+    fn relative_errors_pull_alike() {
+        let loss = Loss { is_relative: true, depth: 0.0 };
+        let pull = |rendered: f64, target: f64| {
+            let weight = loss.weights([rendered; 4], [target; 4])[0];
+            rendered * weight * (rendered - target)
+        };
+        for rendered in [1e-4, 0.01, 0.3, 1.0, 20.0, 1e4] {
+            for target in [0.0, 0.01, 0.5, 3.0, 1e3] {
+                assert!(pull(rendered, target).abs() <= 1.0, "{rendered} {target}");
+            }
+        }
+        assert!(pull(0.1, 10.0) < -0.95 && pull(0.01, 10.0) < -0.9 && pull(10.0, 0.1) > 0.95);
     }
 
     /// One opaque sample at a distance of 0.2 behind the goal: D = 0.2; what is transparent has no error.

@@ -24,35 +24,42 @@ pub(in crate::commands) fn of(dataset: &Dataset, config: &Config) -> Result<Need
 /// When `config` asks for what the photos do not have.
 pub(in crate::commands) fn of_headers(dataset: &Dataset, config: &Config) -> Result<Needs> {
     let used = dataset.train.iter().chain(&dataset.test);
-    Ok(Needs {
+    let needs = Needs {
         lenses: LensKind::among(used.map(|&index| &dataset.frames[index].camera)),
-        alpha: trains_on(dataset, |frame| frame.has_alpha),
         hdr: dataset.is_hdr,
-        deep: dataset.bit_depth == BitDepth::Sixteen,
-        masks: trains_on(dataset, |frame| frame.has_mask),
-        depth: trains_on_depth(dataset, config)?,
         grey: 1.0,
         cascades: dataset.bounds.cascades,
         cameras: dataset.train.len(),
-    })
+        ..Needs::default()
+    };
+    for_photos(needs, dataset, &dataset.train, config)
 }
 
-/// Whether depth is asked for and there.
+/// `needs` with what a record of a photo's pixel must hold, which may differ from one run of a training to the next:
+/// somebody may have added masks, alpha or depth.
 ///
 /// # Errors
-/// When it is asked for and not there.
-pub(in crate::commands) fn trains_on_depth(dataset: &Dataset, config: &Config) -> Result<bool> {
-    let has_depth = trains_on(dataset, |frame| frame.has_depth);
+/// When depth is asked for and not there.
+pub(in crate::commands) fn for_photos(
+    needs: Needs,
+    dataset: &Dataset,
+    train: &[usize],
+    config: &Config,
+) -> Result<Needs> {
+    let any = |condition: fn(&Frame) -> bool| train.iter().any(|&index| condition(&dataset.frames[index]));
+    let has_depth = any(|frame| frame.has_depth);
     ensure!(
         has_depth || config.loss.depth == 0.0,
         "loss.depth is {}, and no training frame has a depth file; name them by `depth_file_path`, or set it to 0",
         config.loss.depth
     );
-    Ok(has_depth && config.loss.depth > 0.0)
-}
-
-fn trains_on(dataset: &Dataset, condition: impl Fn(&Frame) -> bool) -> bool {
-    dataset.train.iter().any(|&index| condition(&dataset.frames[index]))
+    Ok(Needs {
+        alpha: any(|frame| frame.has_alpha),
+        deep: dataset.bit_depth == BitDepth::Sixteen,
+        masks: any(|frame| frame.has_mask),
+        depth: has_depth && config.loss.depth > 0.0,
+        ..needs
+    })
 }
 
 /// Brightness of a typical pixel of linear photos, which the field then takes for 1; 1 for others.

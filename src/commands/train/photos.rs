@@ -8,7 +8,7 @@ use nerf::dataset::Dataset;
 use nerf::gpu::Gpu;
 use nerf::memory::Memory;
 use nerf::views::Views;
-use nerf::words::bytes;
+use nerf::words::{bytes, few};
 use std::sync::Arc;
 
 /// What the training takes of host and device.
@@ -38,10 +38,12 @@ pub(in crate::commands) fn load(
         progress.count(position + 1, setup.train.len(), "images");
         Ok(())
     })?;
-    if let Some(first) = ignored.first() {
+    if !ignored.is_empty() {
         progress.say(&format!(
-            "warning: masks ignore every pixel of {} training photos, which are not trained on: {first}, …",
-            ignored.len()
+            "warning: masks ignore every pixel of {} of {} training photos, which add nothing: {}",
+            ignored.len(),
+            setup.train.len(),
+            few(&ignored)
         ));
     }
     Ok(views)

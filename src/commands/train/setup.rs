@@ -16,6 +16,7 @@ use nerf::model::finest_resolution;
 use nerf::orbit::Orbit;
 use nerf::schedule::Budget;
 use nerf::train::State;
+use nerf::words::few;
 use std::path::Path;
 
 /// Seconds of training on a CPU when nothing is said.
@@ -72,7 +73,7 @@ impl Setup {
             None => (first(wishes, dataset, gpu)?, None, dataset.train.clone(), dataset.test.clone()),
             Some(Checkpoint { about, state }) => {
                 let (train, test) = same_frames(&about, dataset)?;
-                (again(wishes, about, dataset)?, Some(state), train, test)
+                (again(wishes, about, dataset, &train)?, Some(state), train, test)
             }
         };
         about.dataset = wishes.dataset.to_owned();
@@ -173,7 +174,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
 }
 
 /// The description of an earlier training with what the command line changes; the field's size stays.
-fn again(wishes: &Wishes<'_>, mut about: About, dataset: &Dataset) -> Result<About> {
+fn again(wishes: &Wishes<'_>, mut about: About, dataset: &Dataset, train: &[usize]) -> Result<About> {
     let config = configure(about.config.clone(), wishes)?;
     let changed = About { config, ..about.clone() };
     ensure!(
@@ -182,7 +183,7 @@ fn again(wishes: &Wishes<'_>, mut about: About, dataset: &Dataset) -> Result<Abo
          start anew with --overwrite"
     );
     about.config = changed.config;
-    about.needs.depth = needs::trains_on_depth(dataset, &about.config)?;
+    about.needs = needs::for_photos(about.needs, dataset, train, &about.config)?;
     Ok(about)
 }
 
@@ -191,10 +192,10 @@ fn same_frames(about: &About, dataset: &Dataset) -> Result<(Vec<usize>, Vec<usiz
     let (train, missing) = find_frames(dataset, &about.splits.train);
     ensure!(
         missing.is_empty(),
-        "{} frames that were trained on are not in this dataset ({}, …); resume with the dataset that the \
+        "{} frames that were trained on are not in this dataset ({}); resume with the dataset that the \
          training began with, {}",
         missing.len(),
-        missing[0],
+        few(&missing),
         about.dataset
     );
     let orbit = Orbit::of(&cameras(dataset, &train), about.bounds.center);

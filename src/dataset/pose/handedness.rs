@@ -5,6 +5,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::dataset::notes::Notes;
 use crate::dataset::transforms::{Entry, Listing};
+use crate::words::few;
 
 /// Makes one reading of all poses of a dataset's files. Where nearly all are mirrored, that is how they are meant,
 /// and there are two ways to mean it: right, up, back in a left-handed world, which is kept; or right, up,
@@ -60,13 +61,12 @@ fn leave_out(entries: &[&Entry], mirrored: bool, notes: &mut Notes) {
     if odd.is_empty() {
         return;
     }
-    let named = odd[..odd.len().min(3)].join(", ");
-    let more = if odd.len() > 3 { ", …" } else { "" };
     let verb = if odd.len() == 1 { "is" } else { "are" };
     let handed = format!("{verb} {}mirrored", if mirrored { "" } else { "not " });
     notes.warn(format!(
-        "{} of the frames {handed}, unlike the others, and left out: {named}{more}; export them again",
-        odd.len()
+        "{} of the frames {handed}, unlike the others, and left out: {}; export them again",
+        odd.len(),
+        few(&odd)
     ));
 }
 
