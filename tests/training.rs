@@ -200,7 +200,7 @@ fn every_kind_of_scene_trains() {
         ("toys", "--lens=mixed", vec![Pinhole, OpenCv, Fisheye, Orthographic]),
     ];
     for (scene, further, lenses) in scenes {
-        let dataset = generated(scene, scene, &[&small[..], &[further]].concat());
+        let dataset = generated(scene, &format!("{scene}_of_every_kind"), &[&small[..], &[further]].concat());
         let (run, out) = (folder(&format!("{scene}_run")), folder(&format!("{scene}_views")));
         let result = train(&dataset, &run, &["--steps", "24"]);
         assert!(number(&result["psnr"]) > 4.0, "{scene}: {result}");

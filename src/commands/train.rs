@@ -131,7 +131,8 @@ fn summary(end: &End, setup: &Setup, folder: &str) -> String {
             end.skipped
         );
     }
-    if let Some([first, last]) = end.loss.filter(|[first, last]| setup.about.step == 0 && *last > 0.5 * first)
+    if let Some([first, last]) =
+        end.loss.filter(|[first, last]| setup.about.step == 0 && last != first && *last > 0.5 * first)
     {
         text += &format!(
             "; the loss has hardly fallen, from {first:.4} to {last:.4}: give it more steps, or a smaller \

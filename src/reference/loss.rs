@@ -11,8 +11,9 @@
 //! The relative error follows Mildenhall et al. 2022 (RawNeRF, eq. 4), whose weight is `1/(R_x + ε)²`. With that, a
 //! pixel that the field does not show yet pulls with its brightness over the field's. Fields of linear light learn
 //! logarithms of colours, so what counts is the slope by `ln R_x`, `R_x v_x (R_x − g_x)/(2M)`: with the weight above
-//! it is near `±1/(2M)` from twice too bright to far too dark, and never beyond. A weight by the target's square would
-//! let the slope vanish like `R_x/g_x`: colours that have become dark would stay so.
+//! it grows with the ratio of field and photo towards `±1/(2M)`, and never beyond, until `R_x g_x` falls below the 0.01.
+//! A weight by the target's square would let the slope vanish like `R_x/g_x`: colours that have become dark would stay
+//! so.
 //!
 //! `D` is composited like a colour `t_i − g_t` over 0, so that the transparent part of a ray has no error, and its
 //! derivative is that of a colour.
