@@ -118,6 +118,18 @@ pub struct OpenOptions {
     pub reading: Reading,
 }
 
+impl Split {
+    /// What people call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Val => "val",
+            Self::Test => "test",
+        }
+    }
+}
+
 impl Dataset {
     /// The indices of a split.
     pub fn split(&self, split: Split) -> &[usize] {

@@ -136,6 +136,8 @@ impl Default for Needs {
 
 /// Added to the squared colour that an error is relative to, as in tiny-cuda-nn's RelativeL2.
 pub const RELATIVE_FLOOR: f64 = 0.01;
+/// Part of the photo's brightness that a rendered colour is at least taken for in relative errors.
+const RELATIVE_DARKEST: f64 = 1e-3;
 
 /// llvmpipe ends the loops of a thread after so many rounds together, without an error; ordered sums have one round
 /// per kept sample.
@@ -352,6 +354,7 @@ impl Plan {
             ("EPSILON", config.optimizer.epsilon),
             ("L2", config.optimizer.l2),
             ("RELATIVE_FLOOR", RELATIVE_FLOOR),
+            ("RELATIVE_DARKEST", RELATIVE_DARKEST),
             ("DEPTH_WEIGHT", config.loss.depth),
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));

@@ -10,7 +10,7 @@ use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = cli::Cli::parse();
+    let cli = cli::Cli::try_parse().unwrap_or_else(|error| usage(&error));
     let Err(error) = commands::run(&cli) else { return ExitCode::SUCCESS };
     if is_broken_pipe(&error) {
         return ExitCode::SUCCESS;
@@ -22,6 +22,16 @@ fn main() -> ExitCode {
     }
     let _ = writeln!(std::io::stderr(), "error: {message}");
     ExitCode::FAILURE
+}
+
+/// Ends the program as clap does: with help, the version, or a mistake in the command line, which is also said in JSON
+/// where that is asked for.
+fn usage(error: &clap::Error) -> ! {
+    if error.use_stderr() && std::env::args().any(|argument| argument == "--json") {
+        let message = error.render().to_string();
+        let _ = writeln!(std::io::stdout(), "{}", serde_json::json!({ "error": message.trim() }));
+    }
+    error.exit()
 }
 
 /// Whether whoever read our output has gone, which is no failure.

@@ -67,6 +67,10 @@ fn wrong_usage_exits_with_2() {
     fails(here.path(), &["eval", "r", "d", "--background", "grey"], 2, &["black"]);
     fails(here.path(), &["generate"], 2, &["--out"]);
     assert_eq!(fs::read_dir(here.path()).expect("readable").count(), 0, "nothing may be written");
+    let said =
+        nerf().args(["info", "d", "--downscale", "0", "--json"]).assert().code(2).get_output().stdout.clone();
+    let said: serde_json::Value = serde_json::from_slice(&said).expect("one JSON value");
+    assert!(said["error"].as_str().is_some_and(|error| error.contains("--downscale")), "{said}");
 }
 
 #[test]

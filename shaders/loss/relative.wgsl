@@ -4,6 +4,6 @@
 
 // Weights of the squared errors of colour and opacity.
 fn loss_weight(rendered: vec4<f32>, wanted: vec4<f32>) -> vec4<f32> {
-    let squared = rendered.rgb * max(rendered.rgb, wanted.rgb);
+    let squared = max(rendered.rgb, RELATIVE_DARKEST * wanted.rgb) * max(rendered.rgb, wanted.rgb);
     return vec4(1.0 / (squared + RELATIVE_FLOOR), 1.0);
 }

@@ -67,20 +67,23 @@ fn frames(field: &Field, dataset: &Dataset, split: Split, session: &Session<'_>)
         let indices = dataset.split(split).to_vec();
         ensure!(
             !indices.is_empty(),
-            "there are no {split:?} views, neither in the checkpoint nor in the dataset"
+            "there are no {} views, neither in the checkpoint nor in the dataset",
+            split.name()
         );
         session.remarks.warn(&format!(
-            "none of the {} {split:?} views of the training is in this dataset; its own {} are measured",
+            "none of the {} {} views of the training is in this dataset; its own {} are measured",
             names.len(),
+            split.name(),
             indices.len()
         ));
         return Ok(indices);
     }
     if !missing.is_empty() {
         session.remarks.warn(&format!(
-            "{} of {} {split:?} views of the training are missing in this dataset: {}",
+            "{} of {} {} views of the training are missing in this dataset: {}",
             missing.len(),
             names.len(),
+            split.name(),
             few(&missing)
         ));
     }

@@ -21,6 +21,9 @@ struct Job {
     camera: Camera,
 }
 
+/// Most pixels along a side of a rendered image.
+const MOST_PIXELS: u32 = 16_384;
+
 /// How rendered views become files.
 struct Writer<'a> {
     args: &'a Render,
@@ -85,7 +88,16 @@ fn jobs(args: &Render, field: &Field) -> Result<Vec<Job>> {
         let camera = resized(camera, args.width, args.height);
         Job { index, source, camera }
     };
-    Ok(cameras.into_iter().enumerate().take(end).skip(first).map(job).collect())
+    let jobs: Vec<Job> = cameras.into_iter().enumerate().take(end).skip(first).map(job).collect();
+    for Job { source, camera, .. } in &jobs {
+        ensure!(
+            camera.width.max(camera.height) <= MOST_PIXELS,
+            "the camera of {source} has {}x{} pixels, and at most {MOST_PIXELS} a side are rendered; say --width",
+            camera.width,
+            camera.height
+        );
+    }
+    Ok(jobs)
 }
 
 /// The camera at the size asked for; a side that is not given follows.

@@ -86,6 +86,13 @@ impl Reading {
             self.downscale
         );
         let kept = rest.map_or(size, |(width, height)| [width, height]);
+        ensure!(
+            kept.iter().all(|&side| side >= self.downscale),
+            "--downscale {} leaves less than a pixel of {}x{}; divide by less",
+            self.downscale,
+            kept[0],
+            kept[1]
+        );
         let reduced = |side: u32| {
             let nearest = (u64::from(side) + u64::from(self.downscale) / 2) / u64::from(self.downscale);
             nearest.max(1) as u32
@@ -105,7 +112,10 @@ mod tests {
         let (window, size) = reading.part([14, 13]).expect("something is left");
         assert_eq!(window, Window { corner: [1, 2], size: [10, 11] });
         assert_eq!(size, [3, 4]);
-        assert_eq!(reading.part([5, 3]).expect("a pixel").1, [1, 1]);
+        assert_eq!(reading.part([7, 6]).expect("a pixel").1, [1, 1]);
+        assert!(
+            reading.part([7, 4]).expect_err("too little").to_string().contains("less than a pixel of 3x2")
+        );
         let message = reading.part([4, 13]).expect_err("nothing left").to_string();
         assert!(message.contains("1,2,3,0 leaves nothing of 4x13"), "{message}");
         let (window, size) = Reading::default().part([7, 9]).expect("everything");

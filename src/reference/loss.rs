@@ -3,7 +3,7 @@
 //! ```text
 //! loss = 1/(4M) Σ_x v_x (R_x − g_x)²  +  λ/M D²        D = Σ_i w_i (t_i − g_t)
 //! v_x = 1                     squared, and always for the opacity
-//! v_x = 1 / (R_x max(R_x, g_x) + 0.01)     relative; a constant as far as gradients go
+//! v_x = 1 / (max(R_x, g_x/1000) max(R_x, g_x) + 0.01)     relative; a constant as far as gradients go
 //! d_c_xi = v_x (R_x − g_x)/(2M) w_i
 //! d_s_i  = Σ_x v_x (R_x − g_x)/(2M) dR_x/ds_i  +  2λ/M D dD/ds_i
 //! ```
@@ -13,7 +13,7 @@
 //! logarithms of colours, so what counts is the slope by `ln R_x`, `R_x v_x (R_x − g_x)/(2M)`: with the weight above
 //! it grows with the ratio of field and photo towards `±1/(2M)`, and never beyond, until `R_x g_x` falls below the 0.01.
 //! A weight by the target's square would let the slope vanish like `R_x/g_x`: colours that have become dark would stay
-//! so.
+//! so. A thousandth of the target's brightness keeps rays that meet nothing from outweighing all others in the sum.
 //!
 //! `D` is composited like a colour `t_i − g_t` over 0, so that the transparent part of a ray has no error, and its
 //! derivative is that of a colour.
@@ -23,6 +23,9 @@ use super::composite::{CompositeInput, CompositeOutput, composite, d_rendered_by
 
 /// Added to the squared colour that an error is relative to.
 pub const RELATIVE_FLOOR: f64 = 0.01;
+
+/// Part of the target's brightness that a rendered colour is at least taken for.
+pub const DARKEST: f64 = 1e-3;
 
 /// How errors count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,7 +40,10 @@ impl Loss {
     /// `v_x` of colour and opacity.
     pub fn weights(&self, rendered: [f64; 4], target: [f64; 4]) -> [f64; 4] {
         let weight = |x: usize| match self.is_relative && x < 3 {
-            true => 1.0 / (rendered[x] * rendered[x].max(target[x]) + RELATIVE_FLOOR),
+            true => {
+                let (own, wanted) = (rendered[x], target[x]);
+                1.0 / (own.max(DARKEST * wanted) * own.max(wanted) + RELATIVE_FLOOR)
+            }
             false => 1.0,
         };
         std::array::from_fn(weight)

@@ -29,7 +29,17 @@ fn photos_are_measured_as_they_were_trained_on() {
     let (size, after) = measured(&[]);
     assert!(size == [small; 2] && after > before + 1.0, "{before} {after}");
     let other = ["train", text(&TOYS), "--out", text(&run), "--resume", "--downscale", "1"];
-    nerf(&other).assert().code(1);
+    let stderr = nerf(&other).assert().code(1).get_output().stderr.clone();
+    let message = String::from_utf8_lossy(&stderr).into_owned();
+    assert!(message.contains("began with --downscale 2, and now it is 1"), "{message}");
+    let huge = folder("huge.json");
+    let pose = "[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]";
+    let frame = format!("{{\"file_path\": \"a.png\", \"transform_matrix\": {pose}}}");
+    let file = format!("{{\"camera_angle_x\": 1, \"w\": 60000, \"h\": 60000, \"frames\": [{frame}]}}");
+    fs::write(&huge, file).expect("writable");
+    let views = folder("huge_views");
+    let render = ["render", text(&run), "--out", text(&views), "--cameras", text(&huge)];
+    nerf(&render).assert().code(1).stderr(predicates::str::contains("60000x60000 pixels, and at most 16384"));
 }
 
 /// Pixels of a picture, 0 to 1.

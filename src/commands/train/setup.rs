@@ -8,7 +8,7 @@ use anyhow::{Result, ensure};
 use nerf::camera::Camera;
 use nerf::checkpoint::{About, Checkpoint, FORMAT, Splits};
 use nerf::config::{Background, Config};
-use nerf::dataset::Dataset;
+use nerf::dataset::{Dataset, Reading};
 use nerf::gpu::Gpu;
 use nerf::kernels::Plan;
 use nerf::kernels::training::accumulation_name;
@@ -17,6 +17,7 @@ use nerf::orbit::Orbit;
 use nerf::schedule::Budget;
 use nerf::train::State;
 use nerf::words::few;
+use std::fmt::Display;
 use std::path::Path;
 
 /// Seconds of training on a CPU when nothing is said.
@@ -72,6 +73,7 @@ impl Setup {
         let (mut about, state, train, test) = match resumed {
             None => (first(wishes, dataset, gpu)?, None, dataset.train.clone(), dataset.test.clone()),
             Some(Checkpoint { about, state }) => {
+                same_reading(&about.reading, &dataset.reading)?;
                 let (train, test) = same_frames(&about, dataset)?;
                 (again(wishes, about, dataset, &train)?, Some(state), train, test)
             }
@@ -185,6 +187,26 @@ fn again(wishes: &Wishes<'_>, mut about: About, dataset: &Dataset, train: &[usiz
     about.config = changed.config;
     about.needs = needs::for_photos(about.needs, dataset, train, &about.config)?;
     Ok(about)
+}
+
+/// Photos must be read as before: the command line may not say otherwise.
+fn same_reading(then: &Reading, now: &Reading) -> Result<()> {
+    let differs = |flag: &str, then: &dyn Display, now: &dyn Display| -> Result<()> {
+        let (then, now) = (then.to_string(), now.to_string());
+        ensure!(
+            then == now,
+            "the training began with {flag} {then}, and now it is {now}; leave {flag} out on --resume, or start anew \
+             with --overwrite"
+        );
+        Ok(())
+    };
+    let alpha = |reading: &Reading| format!("{:?}", reading.alpha).to_lowercase();
+    let most = |reading: &Reading| reading.max_images.map_or("all".to_owned(), |most| most.to_string());
+    differs("--downscale", &then.downscale, &now.downscale)?;
+    differs("--crop", &then.crop, &now.crop)?;
+    differs("--max-images", &most(then), &most(now))?;
+    differs("--alpha", &alpha(then), &alpha(now))?;
+    differs("--invert-masks", &then.invert_masks, &now.invert_masks)
 }
 
 /// The frames that an earlier training used, by name.

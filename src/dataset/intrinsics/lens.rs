@@ -202,6 +202,12 @@ fn flag(fields: Fields) -> Result<Option<(&'static str, Projection)>> {
 fn coefficients(fields: Fields, model: Option<&str>) -> Result<Option<Coefficients>> {
     const KEYS: [&str; 6] = ["k1", "k2", "k3", "k4", "p1", "p2"];
     const OBJECTS: [&str; 3] = ["distortion_params", "distortion", "distortion_coefficients"];
+    for object in std::iter::once(fields).chain(fields.objects(&OBJECTS)) {
+        for key in ["k5", "k6"] {
+            let value = object.number(key)?.unwrap_or(0.0);
+            ensure!(value == 0.0, "`{key}` is {value}; the rational lens model is not modelled; {ADVICE}");
+        }
+    }
     let source =
         if fields.has(&KEYS) { Some(fields) } else { fields.objects(&OBJECTS).find(|o| o.has(&KEYS)) };
     let Some(source) = source else {
@@ -212,10 +218,6 @@ fn coefficients(fields: Fields, model: Option<&str>) -> Result<Option<Coefficien
         *value = source.number(key)?.unwrap_or(0.0);
     }
     let [k1, k2, k3, k4, p1, p2] = values;
-    for key in ["k5", "k6"] {
-        let value = source.number(key)?.unwrap_or(0.0);
-        ensure!(value == 0.0, "`{key}` is {value}; the rational lens model is not modelled; {ADVICE}");
-    }
     ensure!(
         model != Some("FULL_OPENCV") || k4 == 0.0,
         "`k4` is {k4} and divides in FULL_OPENCV; the rational lens model is not modelled; {ADVICE}"
