@@ -31,6 +31,7 @@ pub use intrinsics::Intrinsics;
 pub use notes::{Note, Severity};
 pub use open::read_cameras;
 pub use photo::Photo;
+pub(crate) use photo::nothing_counts;
 pub use reading::{AlphaMode, Crop, Reading};
 pub use sidecars::DepthEntry;
 pub use splits::HoldOut;
