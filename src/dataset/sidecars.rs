@@ -42,6 +42,15 @@ pub(super) struct Sidecars {
     pub(super) depth: Option<Depth>,
 }
 
+impl Sidecars {
+    /// Drops masks whose headers cannot be read, and says why they cannot.
+    pub(super) fn drop_damaged_masks(&mut self) -> Vec<anyhow::Error> {
+        let mut errors = Vec::new();
+        self.masks.retain(|mask| Header::read(&mask.path).map_err(|error| errors.push(error)).is_ok());
+        errors
+    }
+}
+
 /// A mask's file.
 #[derive(Clone, Debug)]
 pub(super) struct Mask {

@@ -26,3 +26,32 @@ fn masks_that_leave_nothing_to_train_on_are_an_error() {
     toys.info().expect(1, "error", &["every pixel of all", "training photos", "--invert-masks"], &[]);
     assert_eq!(info(&toys.path(), &["--invert-masks"]).of_severity("error"), [""; 0]);
 }
+
+#[test]
+fn every_damaged_file_is_told() {
+    let toys = Toys::new();
+    toys.add_masks(255);
+    for file in [toys.photo(3), toys.photo(7), toys.path().join("m/5.png")] {
+        fs::write(file, "").expect("writable");
+    }
+    fs::remove_file(toys.photo(9)).expect("there");
+    // The first sample of the alpha, and of the surroundings.
+    let whole = fs::read(toys.photo(0)).expect("readable");
+    fs::write(toys.photo(0), &whole[..whole.len() / 2]).expect("writable");
+    let result = toys.info();
+    for name in ["0000.png", "0003.png", "0007.png", "m/5.png"] {
+        result.expect(1, "error", &[name], &[]);
+    }
+    result.expect(1, "warning", &["1 of 24 listed images", "0009"], &[]);
+    assert_eq!([&result.json["frames"], &result.json["found"]], [24, 21]);
+    assert_eq!(result.json["missing"], json!(["./train/0003", "./train/0007", "./train/0009"]));
+    for split in ["train", "val", "test"] {
+        for entry in fs::read_dir(toys.path().join(split)).expect("readable") {
+            fs::write(entry.expect("readable").path(), "").expect("there");
+        }
+    }
+    let result = toys.info();
+    result.expect(1, "error", &["0004.png", "found 0 bytes"], &[]);
+    assert_eq!([&result.json["frames"], &result.json["found"]], [24, 0]);
+    assert!(!result.stderr.contains("put the images"), "{}", result.stderr);
+}
