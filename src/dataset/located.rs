@@ -148,6 +148,7 @@ impl Present {
         let reading = &options.reading;
         let mut damaged = self.damaged;
         let mut finder = Finder::new(root);
+        let is_any_found = self.located.iter().any(|frame| frame.found.is_some());
         let mut members = Vec::new();
         let mut frames = Vec::new();
         for Located { entry, found, .. } in self.located {
@@ -166,12 +167,24 @@ impl Present {
             members.push((entry.split, canonical(&frame.path)));
             frames.push(frame);
         }
-        let unmasked = frames.iter().filter(|frame: &&Frame| !frame.has_mask).count();
-        if unmasked > 0 && unmasked < frames.len() {
-            let all = frames.len();
-            notes.note(format!("{unmasked} of {all} frames have no mask; all their pixels count"));
-        }
+        remark_on_masks(&frames, &finder, is_any_found && reading.invert_masks, notes);
         Ok(Built { frames, members, damaged })
+    }
+}
+
+/// Remarks on frames without masks, where that may not be meant.
+fn remark_on_masks(frames: &[Frame], finder: &Finder, inverts: bool, notes: &mut Notes) {
+    let (all, unmasked) = (frames.len(), frames.iter().filter(|frame| !frame.has_mask).count());
+    if unmasked > 0 && unmasked < all {
+        notes.note(format!("{unmasked} of {all} frames have no mask; all their pixels count"));
+    }
+    if unmasked == all {
+        finder.unmatched_masks().into_iter().for_each(|message| notes.warn(message));
+        if inverts {
+            notes.warn(
+                "masks are to be inverted, but no frame has one; add the masks, or leave out --invert-masks",
+            );
+        }
     }
 }
 

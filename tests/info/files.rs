@@ -55,3 +55,28 @@ fn every_damaged_file_is_told() {
     assert_eq!([&result.json["frames"], &result.json["found"]], [24, 0]);
     assert!(!result.stderr.contains("put the images"), "{}", result.stderr);
 }
+
+#[test]
+fn masks_that_belong_to_no_photo_are_told() {
+    let toys = Toys::new();
+    info(&toys.path(), &["--invert-masks"]).expect(
+        0,
+        "warning",
+        &["no frame has one", "--invert-masks"],
+        &[],
+    );
+    let masks = toys.path().join("masks");
+    fs::create_dir(&masks).expect("writable");
+    toys.info().expect_no_alarm();
+    let mask = image::GrayImage::from_pixel(64, 64, image::Luma([255]));
+    for name in ["mask_0000.png", "mask_0001.png"] {
+        mask.save(masks.join(name)).expect("writable");
+    }
+    let parts = ["no mask in", "found mask_0000.png, expected 0000.png for 0000.png", "name each mask"];
+    toys.info().expect(0, "warning", &parts, &[]);
+    mask.save(masks.join("0000.png")).expect("writable");
+    let result = toys.info();
+    result.expect(0, "note", &["of 24 frames have no mask"], &[]);
+    result.expect_no_alarm();
+    assert!(info(&toys.path(), &["--invert-masks"]).of_severity("error").is_empty());
+}
