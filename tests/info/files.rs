@@ -80,3 +80,11 @@ fn masks_that_belong_to_no_photo_are_told() {
     result.expect_no_alarm();
     assert!(info(&toys.path(), &["--invert-masks"]).of_severity("error").is_empty());
 }
+
+#[test]
+fn a_single_view_to_train_on_is_told_beside_those_to_test_on() {
+    let toys = Toys::new();
+    let parts = ["there is a single image to train on", "add photos from other places"];
+    info(&toys.path(), &["--max-images", "1"]).expect(0, "warning", &parts, &[]);
+    assert!(info(&toys.path(), &["--max-images", "2"]).of_severity("warning").is_empty());
+}
