@@ -88,3 +88,13 @@ fn a_single_view_to_train_on_is_told_beside_those_to_test_on() {
     info(&toys.path(), &["--max-images", "1"]).expect(0, "warning", &parts, &[]);
     assert!(info(&toys.path(), &["--max-images", "2"]).of_severity("warning").is_empty());
 }
+
+#[test]
+fn a_map_that_cannot_be_written_leaves_the_report() {
+    let toys = Toys::new();
+    let map = toys.folder.path().join("nowhere/map.svg");
+    let result = info(&toys.path(), &["--plot", &map.to_string_lossy()]);
+    assert_eq!((result.code, &result.json["ok"]), (1, &json!(true)));
+    assert!(result.stderr.contains("map.svg: the folder"), "{}", result.stderr);
+    assert!(!result.stderr.contains(".part"), "{}", result.stderr);
+}
