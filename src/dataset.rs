@@ -15,6 +15,7 @@ mod open;
 mod photo;
 mod pose;
 mod reading;
+mod samples;
 mod sidecars;
 mod splits;
 pub mod transforms;
@@ -31,6 +32,7 @@ pub use intrinsics::Intrinsics;
 pub use notes::{Note, Severity};
 pub use open::read_cameras;
 pub use photo::Photo;
+pub(crate) use photo::nothing_counts;
 pub use reading::{AlphaMode, Crop, Reading};
 pub use sidecars::DepthEntry;
 pub use splits::HoldOut;
@@ -56,8 +58,11 @@ pub struct Dataset {
     pub test: Vec<usize>,
     /// Number of frames listed, present or not.
     pub listed: usize,
-    /// Names of the listed frames whose images are missing.
+    /// Names of the listed frames whose images are missing or cannot be read.
     pub missing: Vec<String>,
+    /// What is wrong with each image or mask whose header cannot be read, where
+    /// [`allow_missing`](OpenOptions::allow_missing) let it pass.
+    pub damaged: Vec<String>,
     /// Whether the images are scene-linear.
     pub is_hdr: bool,
     /// How finely the finest image is stored; every photo is loaded in this depth.
@@ -112,7 +117,8 @@ pub struct OpenOptions {
     /// What to hold out where the dataset has no test or validation split.
     pub hold_out: HoldOut,
     /// Where no image at all is present: open the dataset all the same, with every listed frame and the
-    /// sizes the file declares. Such a dataset cannot load images.
+    /// sizes the file declares. Such a dataset cannot load images. Images that cannot be read are missing,
+    /// too, and frames whose masks cannot be read are used without them; [`Dataset::damaged`] tells both.
     pub allow_missing: bool,
     /// How photos are read.
     pub reading: Reading,

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow, ensure};
 
 /// Writes a file through `write` under a temporary name in the same folder, syncs it to disk and renames
 /// it to `path`: readers see the old file or the complete new one.
@@ -26,7 +26,8 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) ->
     attempt().with_context(|| format!("writing {}", path.display()))
 }
 
-fn temporary_in(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+fn temporary_in(folder: &Path) -> Result<tempfile::NamedTempFile> {
+    ensure!(folder.is_dir(), "the folder {} does not exist", folder.display());
     let mut builder = tempfile::Builder::new();
     builder.prefix(".nerf-").suffix(".part");
     // Temporary files are private by default; results get the permissions any new file would get.
@@ -34,12 +35,24 @@ fn temporary_in(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     let permissions: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     #[cfg(unix)]
     builder.permissions(permissions);
-    builder.tempfile_in(folder)
+    // The error itself names the temporary file, which says nothing to anybody.
+    let reason =
+        |error: std::io::Error| anyhow!("cannot create a file in {}: {}", folder.display(), error.kind());
+    builder.tempfile_in(folder).map_err(reason)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn errors_name_no_temporary_file() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("nowhere/out.txt");
+        let error = write_atomically(&path, |_| Ok(())).expect_err("there is no such folder");
+        let error = format!("{error:#}");
+        assert!(error.ends_with("nowhere does not exist") && !error.contains(".nerf-"), "{error}");
+    }
 
     #[test]
     fn replaces_the_file_or_leaves_it_alone() {

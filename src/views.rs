@@ -1,7 +1,7 @@
 //! The training views on their way to the device: cameras, photos, and what their silhouettes tell.
 
 use crate::camera::Camera;
-use crate::dataset::{Bounds, Photo};
+use crate::dataset::{Bounds, Photo, nothing_counts};
 use crate::gpu::Gpu;
 use crate::gpu::banks::{Banks, Capacity, rows_of};
 use crate::kernels::photos::{self, Record, Units};
@@ -104,10 +104,7 @@ impl Views {
     pub(crate) fn check(&self) -> Result<()> {
         let (photos, cameras) = (self.silhouettes.len(), self.cameras.len());
         ensure!(photos == cameras, "{photos} photos were added for {cameras} cameras");
-        ensure!(
-            !self.on_device.is_empty(),
-            "the masks ignore every pixel of all {photos} training photos; they may be inverted: try --invert-masks"
-        );
+        ensure!(!self.on_device.is_empty(), "{}", nothing_counts(photos));
         Ok(())
     }
 }

@@ -5,6 +5,7 @@ use crate::cli::generate::Generate;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
 use nerf::scene::{self, Views};
+use nerf::words::count;
 use serde_json::json;
 
 pub(super) fn run(args: &Generate, session: &Session<'_>) -> Result<()> {
@@ -27,7 +28,12 @@ pub(super) fn run(args: &Generate, session: &Session<'_>) -> Result<()> {
     let summary = scene::generate(&options, out, &|done| progress.count(done, total, "views"))?;
     drop(progress);
     let folder = out.display();
-    let text = format!("{} views of {}, {} files in {folder}", summary.views, summary.scene, summary.files);
+    let text = format!(
+        "{} of {}, {} in {folder}",
+        count(summary.views, "view"),
+        summary.scene,
+        count(summary.files, "file")
+    );
     let mut result = serde_json::to_value(&summary)?;
     result["out"] = json!(folder.to_string());
     session.print(&result, &text)

@@ -50,13 +50,14 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
         Err(error) => return unreadable(args, &format!("{error:#}"), session),
     };
     let mut report = inspect(args, &dataset, session)?;
+    report.problems.sort_by_key(|problem| problem.severity);
+    session.print(&report.json(), &report.text())?;
     if let Some(path) = &args.plot {
         let marked = (report.problems.iter().filter(|problem| problem.severity != Severity::Note))
             .flat_map(|problem| problem.frames.iter().copied());
-        plot(path, &map::draw(&dataset, &report.survey, &marked.collect()))?;
+        let drawing = map::draw(&dataset, &report.survey, &marked.collect());
+        plot(path, &drawing).map_err(|error| Failed(format!("{error:#}")))?;
     }
-    report.problems.sort_by_key(|problem| problem.severity);
-    session.print(&report.json(), &report.text())?;
     match report.problems.first().filter(|problem| problem.severity == Severity::Error) {
         Some(problem) => Err(Failed(format!("a training would fail: {}", problem.message)).into()),
         None => Ok(()),
@@ -114,9 +115,9 @@ fn unreadable(args: &Info, message: &str, session: &Session<'_>) -> Result<()> {
         "dataset": args.dataset.display().to_string(),
         "ok": false,
         "dialect": Value::Null,
-        "frames": 0,
-        "found": 0,
-        "cameras": 0,
+        "frames": Value::Null,
+        "found": Value::Null,
+        "cameras": Value::Null,
         "box": Value::Null,
         "memory": Value::Null,
         "problems": [{ "severity": Severity::Error, "message": message }],

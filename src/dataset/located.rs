@@ -20,6 +20,8 @@ use crate::words::few;
 pub(super) struct Located {
     entry: Entry,
     found: Option<(PathBuf, Header)>,
+    /// Why the image, which is there, is not found.
+    damage: Option<String>,
 }
 
 /// All listed frames that a dataset goes on with.
@@ -29,16 +31,26 @@ pub(super) struct Present {
     /// Names of those that are missing.
     pub(super) missing: Vec<String>,
     located: Vec<Located>,
+    damaged: Vec<String>,
 }
 
 /// A frame as far as splitting goes: the split it is listed in, and its file.
 pub(super) type Membership = (Option<Split>, PathBuf);
+
+/// Frames, with what else came of making them.
+pub(super) struct Built {
+    pub(super) frames: Vec<Frame>,
+    pub(super) members: Vec<Membership>,
+    /// As [`super::Dataset::damaged`].
+    pub(super) damaged: Vec<String>,
+}
 
 /// Looks for the images of one listing, in natural order of their names.
 pub(super) fn locate(
     mut listing: Listing,
     split: Option<Split>,
     root: &Path,
+    allow_damaged: bool,
     notes: &mut Notes,
 ) -> Result<Vec<Located>> {
     notes.append(listing.notes);
@@ -61,8 +73,13 @@ pub(super) fn locate(
     }
     let inspect = |(entry, path): (Entry, Option<PathBuf>)| {
         let header = path.as_deref().map(Header::read).transpose();
-        let header = header.with_context(|| entry.label.clone())?;
-        Ok(Located { entry, found: path.zip(header) })
+        match header.with_context(|| entry.label.clone()) {
+            Ok(header) => Ok(Located { entry, found: path.zip(header), damage: None }),
+            Err(error) if allow_damaged => {
+                Ok(Located { entry, found: None, damage: Some(format!("{error:#}")) })
+            }
+            Err(error) => Err(error),
+        }
     };
     paths.into_par_iter().map(inspect).collect()
 }
@@ -72,7 +89,7 @@ fn canonical(path: &Path) -> PathBuf {
 }
 
 impl Present {
-    /// Sets missing frames aside.
+    /// Sets missing and damaged frames aside.
     pub(super) fn new(
         located: Vec<Located>,
         root: &Path,
@@ -80,24 +97,29 @@ impl Present {
         notes: &mut Notes,
     ) -> Result<Self> {
         let listed = located.len();
-        let absent = located.iter().filter(|frame| frame.found.is_none());
-        let missing: Vec<String> = absent.map(|frame| frame.entry.file_path.clone()).collect();
-        if missing.is_empty() {
-            return Ok(Self { listed, missing, located });
+        let names = |holds: fn(&Located) -> bool| -> Vec<String> {
+            located.iter().filter(|frame| holds(frame)).map(|frame| frame.entry.file_path.clone()).collect()
+        };
+        let missing = names(|frame| frame.found.is_none());
+        let nowhere = names(|frame| frame.found.is_none() && frame.damage.is_none());
+        let damaged = located.iter().filter_map(|frame| frame.damage.clone()).collect();
+        if !nowhere.is_empty() {
+            let message = format!(
+                "{} of {listed} listed images are missing in {}: {}",
+                nowhere.len(),
+                root.display(),
+                few(&nowhere)
+            );
+            if nowhere.len() < listed {
+                notes.warn(format!("{message}; they are skipped"));
+            } else {
+                let remedy = format!("put the images where `file_path` says, as {FORMATS}");
+                ensure!(options.allow_missing, "{message}; {remedy}");
+            }
         }
-        let message = format!(
-            "{} of {listed} listed images are missing in {}: {}",
-            missing.len(),
-            root.display(),
-            few(&missing)
-        );
-        if missing.len() < listed {
-            notes.warn(format!("{message}; they are skipped"));
-            let present = located.into_iter().filter(|frame| frame.found.is_some());
-            return Ok(Self { listed, missing, located: present.collect() });
-        }
-        ensure!(options.allow_missing, "{message}; put the images where `file_path` says, as {FORMATS}");
-        Ok(Self { listed, missing, located })
+        let is_any_found = missing.len() < listed;
+        let located = located.into_iter().filter(|frame| frame.found.is_some() || !is_any_found).collect();
+        Ok(Self { listed, missing, located, damaged })
     }
 
     /// The depth of the finest images; display-referred and linear ones do not mix.
@@ -122,19 +144,21 @@ impl Present {
     }
 
     /// Frames with cameras at the size of their photos, and what the splits need to know.
-    pub(super) fn build(
-        self,
-        root: &Path,
-        reading: &Reading,
-        notes: &mut Notes,
-    ) -> Result<(Vec<Frame>, Vec<Membership>)> {
+    pub(super) fn build(self, root: &Path, options: &OpenOptions, notes: &mut Notes) -> Result<Built> {
+        let reading = &options.reading;
+        let mut damaged = self.damaged;
         let mut finder = Finder::new(root);
+        let is_any_found = self.located.iter().any(|frame| frame.found.is_some());
         let mut members = Vec::new();
         let mut frames = Vec::new();
-        for Located { entry, found } in self.located {
+        for Located { entry, found, .. } in self.located {
             let frame = match found {
                 Some((path, header)) => {
-                    let sidecars = finder.find(&entry, &path, notes);
+                    let mut sidecars = finder.find(&entry, &path, notes);
+                    if options.allow_missing {
+                        let errors = sidecars.drop_damaged_masks();
+                        damaged.extend(errors.iter().map(|error| format!("{}: {error:#}", entry.label)));
+                    }
                     frame(&entry, (path, header), sidecars, reading, notes)
                 }
                 None => absent(&entry, reading, notes),
@@ -143,12 +167,24 @@ impl Present {
             members.push((entry.split, canonical(&frame.path)));
             frames.push(frame);
         }
-        let unmasked = frames.iter().filter(|frame: &&Frame| !frame.has_mask).count();
-        if unmasked > 0 && unmasked < frames.len() {
-            let all = frames.len();
-            notes.note(format!("{unmasked} of {all} frames have no mask; all their pixels count"));
+        remark_on_masks(&frames, &finder, is_any_found && reading.invert_masks, notes);
+        Ok(Built { frames, members, damaged })
+    }
+}
+
+/// Remarks on frames without masks, where that may not be meant.
+fn remark_on_masks(frames: &[Frame], finder: &Finder, inverts: bool, notes: &mut Notes) {
+    let (all, unmasked) = (frames.len(), frames.iter().filter(|frame| !frame.has_mask).count());
+    if unmasked > 0 && unmasked < all {
+        notes.note(format!("{unmasked} of {all} frames have no mask; all their pixels count"));
+    }
+    if unmasked == all {
+        finder.unmatched_masks().into_iter().for_each(|message| notes.warn(message));
+        if inverts {
+            notes.warn(
+                "masks are to be inverted, but no frame has one; add the masks, or leave out --invert-masks",
+            );
         }
-        Ok((frames, members))
     }
 }
 

@@ -3,20 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
-use rayon::prelude::*;
 
 use super::bounds::{Bounds, Surroundings};
-use super::located::{Present, locate};
+use super::located::{Built, Present, locate};
 use super::notes::Notes;
-use super::photo::How;
-use super::reading::{AlphaMode, Reading};
+use super::samples::Samples;
 use super::transforms::{self, Entry};
-use super::{Dataset, Frame, HoldOut, OpenOptions, Split, splits};
+use super::{Dataset, HoldOut, OpenOptions, Split, splits};
 use crate::camera::Camera;
-use crate::image::{BitDepth, Evidence, Multiplied};
-
-/// Training images that are looked at to tell what their alpha means.
-const ALPHA_SAMPLES: usize = 4;
+use crate::image::BitDepth;
 
 impl Dataset {
     /// Opens a folder or a single .json file; of the images, all headers are read and a few are decoded.
@@ -43,21 +38,26 @@ impl Dataset {
             }
             // The training file speaks for the scene.
             scene_box = scene_box.or(listing.scene_box);
-            located.extend(locate(listing, *split, &root, &mut notes)?);
+            located.extend(locate(listing, *split, &root, options.allow_missing, &mut notes)?);
         }
         let present = Present::new(located, &root, options, &mut notes)?;
         let bit_depth = present.bit_depth(&mut notes)?;
         let (listed, missing) = (present.listed, present.missing.clone());
-        let (frames, members) = present.build(&root, &options.reading, &mut notes)?;
+        let Built { frames, members, damaged } = present.build(&root, options, &mut notes)?;
         let members: Vec<_> = members.iter().map(|(s, path)| (*s, path.as_path())).collect();
         let mut splits = splits::assign(&members, options.hold_out, &mut notes);
         thin_out(&mut splits.train, options.reading.max_images, &mut notes);
         let used = if splits.train.is_empty() { (0..frames.len()).collect() } else { splits.train.clone() };
         let has_images = missing.len() < listed;
         let mut reading = options.reading.clone();
-        reading.alpha = alpha(&frames, &used, bit_depth, &reading, &mut notes)?;
+        let samples = Samples {
+            frames: used.iter().map(|&i| &frames[i]).collect(),
+            bits: bit_depth,
+            skips_damaged: options.allow_missing,
+        };
+        reading.alpha = samples.alpha(&reading, &mut notes)?;
         let surroundings = match has_images {
-            true => surroundings(&frames[used[0]], How::new(bit_depth, &reading))?,
+            true => samples.surroundings(&reading)?,
             false => Surroundings::Unknown,
         };
         let cameras: Vec<&Camera> = used.iter().map(|&i| &frames[i].camera).collect();
@@ -72,6 +72,7 @@ impl Dataset {
             test: splits.test,
             listed,
             missing,
+            damaged,
             is_hdr: bit_depth == BitDepth::Float,
             bit_depth,
             reading,
@@ -89,36 +90,6 @@ fn thin_out(train: &mut Vec<usize>, most: Option<usize>, notes: &mut Notes) {
         *train = (0..most).map(|i| train[i * count / most]).collect();
         notes.note(format!("{most} of {count} frames are trained on, evenly spaced, as asked"));
     }
-}
-
-/// What alpha means: as asked, or as a few of the images to train on show.
-fn alpha(
-    frames: &[Frame],
-    used: &[usize],
-    bits: BitDepth,
-    reading: &Reading,
-    notes: &mut Notes,
-) -> Result<AlphaMode> {
-    if reading.alpha != AlphaMode::Auto {
-        return Ok(reading.alpha);
-    }
-    if bits == BitDepth::Float {
-        return Ok(AlphaMode::Premultiplied);
-    }
-    let with_alpha: Vec<_> = used.iter().map(|&index| &frames[index]).filter(|f| f.has_own_alpha).collect();
-    let count = with_alpha.len().min(ALPHA_SAMPLES);
-    let samples: Vec<_> = (0..count).map(|i| with_alpha[i * with_alpha.len() / count]).collect();
-    let how = How { multiplied: Multiplied::Straight, ..How::new(bits, reading) };
-    let look = |frame: &&Frame| Ok(frame.upright(how)?.evidence());
-    let evidence: Vec<Evidence> = samples.par_iter().map(look).collect::<Result<_>>()?;
-    if !evidence.into_iter().fold(Evidence::default(), Evidence::and).is_premultiplied() {
-        return Ok(AlphaMode::Straight);
-    }
-    notes.note(
-        "no colour is above its alpha, though the opaque pixels are bright: the colours are taken for premultiplied \
-         with alpha; if their edges come out too bright, say --alpha straight",
-    );
-    Ok(AlphaMode::Premultiplied)
 }
 
 /// Reads the cameras of a single file, in its order, without looking for images: name and camera. Sizes
@@ -199,10 +170,4 @@ impl Entry {
         let size = self.intrinsics.likely_size()?.round().max(glam::DVec2::ONE);
         Some([size.x as u32, size.y as u32])
     }
-}
-
-/// An alpha channel alone says little (screenshots have one), so the first image is looked at.
-fn surroundings(first: &Frame, how: How) -> Result<Surroundings> {
-    let is_cutout = first.has_alpha && first.upright(how)?.is_cutout();
-    Ok(if is_cutout { Surroundings::Empty } else { Surroundings::Background })
 }

@@ -8,6 +8,7 @@ use super::{Dataset, Frame, look_ahead};
 use crate::image::{
     BitDepth, Image, Multiplied, Turn, Window, crop, load_depth, nearest, reduce_any, reduce_depth,
 };
+use crate::words::count;
 
 /// One frame's pixels, at the size of its camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +32,12 @@ impl Photo {
     pub fn is_ignored(&self) -> bool {
         !self.ignored.is_empty() && self.ignored.iter().all(|&ignored| ignored)
     }
+}
+
+/// What keeps a training from beginning where masks ignore all of its photos.
+pub(crate) fn nothing_counts(photos: usize) -> String {
+    let photos = count(photos, "training photo");
+    format!("the masks ignore every pixel of all {photos}; they may be inverted: try --invert-masks")
 }
 
 impl From<Image> for Photo {

@@ -42,6 +42,15 @@ pub(super) struct Sidecars {
     pub(super) depth: Option<Depth>,
 }
 
+impl Sidecars {
+    /// Drops masks whose headers cannot be read, and says why they cannot.
+    pub(super) fn drop_damaged_masks(&mut self) -> Vec<anyhow::Error> {
+        let mut errors = Vec::new();
+        self.masks.retain(|mask| Header::read(&mask.path).map_err(|error| errors.push(error)).is_ok());
+        errors
+    }
+}
+
 /// A mask's file.
 #[derive(Clone, Debug)]
 pub(super) struct Mask {
@@ -89,12 +98,14 @@ pub(super) fn listed(frame: Fields, file: Fields) -> Result<(Option<String>, Opt
 pub(super) struct Finder<'a> {
     root: &'a Path,
     folders: HashMap<PathBuf, HashSet<OsString>>,
+    /// A folder `masks` and the first photo that has none in it.
+    unmatched: Option<(PathBuf, PathBuf)>,
 }
 
 impl<'a> Finder<'a> {
     /// For the dataset in the folder `root`.
     pub(super) fn new(root: &'a Path) -> Self {
-        Self { root, folders: HashMap::new() }
+        Self { root, folders: HashMap::new(), unmatched: None }
     }
 
     /// The files beside the photo of `entry`, which was found at `image`.
@@ -144,12 +155,31 @@ impl<'a> Finder<'a> {
                 if found.is_some() {
                     return found;
                 }
+                if !image.starts_with(&masks) {
+                    self.unmatched.get_or_insert_with(|| (masks, image.to_owned()));
+                }
             }
             if is_last {
                 break;
             }
         }
         None
+    }
+
+    /// Where no photo has a mask though there is a folder of them: how they are named, and how they should be.
+    pub(super) fn unmatched_masks(&self) -> Option<String> {
+        let (masks, image) = self.unmatched.as_ref()?;
+        let names = std::fs::read_dir(masks).ok()?.flatten().map(|entry| entry.file_name());
+        let first =
+            names.map(|name| name.to_string_lossy().into_owned()).filter(|name| !name.starts_with('.'));
+        Some(format!(
+            "no mask in {} is named like a photo: found {}, expected {}.png for {}; no mask is used; name each mask like \
+             its photo",
+            masks.display(),
+            first.min()?,
+            image.file_stem()?.to_string_lossy(),
+            image.file_name()?.to_string_lossy()
+        ))
     }
 
     /// `<image>.alpha.<extension>`, the image named with its extension or without.

@@ -92,14 +92,17 @@ impl Gaze {
     }
 
     pub(super) fn findings(&self, scene: &Scene<'_>) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        if scene.count() == 1 || scene.dataset.train.len() == 1 {
+            findings.push(Finding::warning(
+                "there is a single image to train on: without a second view nothing tells how far away things are; \
+                 add photos from other places",
+            ));
+        }
         if scene.count() == 1 {
-            return vec![Finding::warning(
-                "there is a single image: without a second view nothing tells how far away things are; add photos \
-                 from other places",
-            )];
+            return findings;
         }
         let extent = scene.extent();
-        let mut findings = Vec::new();
         if extent <= 1e-9 * (1.0 + self.focus.length()) {
             findings.push(Finding::warning(format!(
                 "all {} cameras are at the same place: nothing tells how far away things are; check that \

@@ -3,10 +3,10 @@
 mod grey;
 
 use super::{Finding, Spread, names};
-use crate::dataset::{Dataset, Photo};
+use crate::dataset::{Dataset, Photo, nothing_counts};
 use crate::words::count;
 use grey::{Grey, THUMBNAIL};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Longest side that sharpness is measured at, in pixels: finer detail is noise as often as detail.
 const MOST_SIDE: u32 = 1024;
@@ -49,6 +49,8 @@ pub struct Look {
     pub white: f64,
     /// Whether every pixel is transparent or masked out.
     pub is_empty: bool,
+    /// Whether masks ignore every pixel: there is nothing to train on.
+    pub is_ignored: bool,
     /// Whether it has one brightness everywhere.
     is_flat: bool,
     /// Tells pictures of different content apart.
@@ -77,6 +79,7 @@ impl Look {
             black: black.unwrap_or(0.0),
             white: white.filter(|_| !image.is_hdr()).unwrap_or(0.0),
             is_empty,
+            is_ignored: photo.is_ignored(),
             is_flat: coarse.variance() <= FLAT,
             fingerprint: fine.fingerprint(),
             thumbnail: coarse.thumbnail(),
@@ -113,6 +116,7 @@ impl Gallery {
                 .flatten()
                 .collect();
         findings.extend(self.blank(dataset));
+        findings.extend(self.ignored(dataset));
         findings.sort_by_key(|finding| finding.severity);
         findings
     }
@@ -144,6 +148,14 @@ impl Gallery {
             let message = format!("{number} {verb} {what}: {}; {remedy}", names(dataset, &frames));
             (!frames.is_empty()).then(|| Finding::warning(message).about(frames))
         })
+    }
+
+    /// Masks that leave nothing to train on.
+    fn ignored(&self, dataset: &Dataset) -> Option<Finding> {
+        let ignored: HashSet<usize> = self.which(|(_, look)| look.is_ignored).into_iter().collect();
+        let nothing_is_left = !dataset.train.is_empty() && dataset.train.iter().all(|i| ignored.contains(i));
+        nothing_is_left
+            .then(|| Finding::error(nothing_counts(dataset.train.len())).about(dataset.train.clone()))
     }
 
     /// Whether two frames, which have one pose, show different pictures.

@@ -15,6 +15,9 @@ use anyhow::{Context, Result};
 use super::{BitDepth, Header, Image, Pixels, check_count, check_size, of_file};
 use crate::file::write_atomically;
 
+/// Said of what the decoder does not take.
+const DAMAGED: &str = "the file is damaged or incomplete, or uses a rare variant of its format; copy it again, or export it again";
+
 /// What [`write_exr`] stores, each `[height * width]`.
 #[derive(Clone, Copy, Debug)]
 pub struct ExrPixels<'a> {
@@ -106,7 +109,12 @@ fn read_one(path: &Path, names: &[&str]) -> Result<(u32, u32, Vec<f32>)> {
         .specific_channels()
         .required::<f32>(channels[0].clone())
         .collect_pixels(create, set);
-    let image = channels.first_valid_layer().all_attributes().non_parallel().from_buffered(reader(path)?)?;
+    let image = channels
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(reader(path)?)
+        .context(DAMAGED)?;
     Ok((window.size[0], window.size[1], image.layer_data.channel_data.pixels))
 }
 
@@ -133,7 +141,12 @@ pub(super) fn load(path: &Path) -> Result<Image> {
             window.set(pixels, at, repaired([grey, grey, grey, alpha]));
         };
         let channels = layers.required::<f32>(red).optional(alpha, 1.0_f32).collect_pixels(create, set);
-        let image = channels.first_valid_layer().all_attributes().non_parallel().from_buffered(file)?;
+        let image = channels
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_buffered(file)
+            .context(DAMAGED)?;
         image.layer_data.channel_data.pixels
     } else {
         let create = move |_: Vec2<usize>, _: &_| window.canvas(outside);
@@ -142,7 +155,12 @@ pub(super) fn load(path: &Path) -> Result<Image> {
         };
         let channels = layers.required::<f32>(red).required::<f32>(green).required::<f32>(blue);
         let channels = channels.optional(alpha, 1.0_f32).collect_pixels(create, set);
-        let image = channels.first_valid_layer().all_attributes().non_parallel().from_buffered(file)?;
+        let image = channels
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_buffered(file)
+            .context(DAMAGED)?;
         image.layer_data.channel_data.pixels
     };
     let [width, height] = window.size;
@@ -165,7 +183,7 @@ fn reader(path: &Path) -> Result<BufReader<File>> {
 
 /// The parts of a file, which the crate calls layers, with sizes that are worth decoding.
 fn parts(path: &Path) -> Result<Vec<Part>> {
-    let parts = MetaData::read_from_buffered(reader(path)?, false)?.headers;
+    let parts = MetaData::read_from_buffered(reader(path)?, false).context(DAMAGED)?.headers;
     for part in &parts {
         check_size(part.layer_size.0 as u64, part.layer_size.1 as u64)?;
     }
@@ -276,6 +294,23 @@ mod tests {
         }
         let missing = read_exr_channel(&path, "N").expect_err("no such channel");
         assert!(format!("{missing:#}").contains("found A, B, G, R, Z"));
+    }
+
+    #[test]
+    fn damaged_files_are_told_with_the_remedy() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("half.exr");
+        let color: Vec<[f32; 4]> = (0..4096).map(|i| [(i * i % 97) as f32, 0.5, i as f32, 1.0]).collect();
+        let pixels = ExrPixels { color: &color, depth: None };
+        write_exr(&path, 64, 64, &pixels, Precision::Float).expect("writable");
+        let whole = std::fs::read(&path).expect("readable");
+        for length in [16, whole.len() / 2] {
+            std::fs::write(&path, &whole[..length]).expect("writable");
+            let errors = [Image::load(&path).err(), read_exr_channel(&path, "R").err()];
+            for error in errors.map(|error| format!("{:#}", error.expect("is cut short"))) {
+                assert!(error.contains("half.exr: the file is damaged") && error.contains("export it again"));
+            }
+        }
     }
 
     #[test]

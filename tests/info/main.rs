@@ -1,5 +1,6 @@
 //! `nerf info`: healthy datasets raise no alarm, and each kind of damage is named with what to do.
 
+mod files;
 #[path = "../shared/mod.rs"]
 mod shared;
 mod toys;
@@ -249,6 +250,7 @@ fn what_cannot_be_trained_on_fails_with_one_object() {
     toys.info().expect(1, "error", &["there is no frame to train on", "name the folder"], &[]);
     let nowhere = info(&toys.path().join("nowhere"), &[]);
     nowhere.expect(1, "error", &["nowhere does not exist"], &[]);
+    assert!(["frames", "found", "cameras"].iter().all(|key| nowhere.json[key].is_null()), "{}", nowhere.json);
 }
 
 #[test]

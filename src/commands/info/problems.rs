@@ -11,9 +11,10 @@ pub(super) fn found(dataset: &Dataset) -> usize {
 /// What keeps a training from beginning, and what the reader remarked.
 pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Finding> {
     let mut problems = Vec::new();
-    if found(dataset) == 0 {
+    problems.extend(dataset.damaged.iter().map(Finding::error));
+    if found(dataset) == 0 && problems.is_empty() {
         problems.push(Finding::error(nothing_found(dataset)));
-    } else if dataset.train.is_empty() {
+    } else if found(dataset) > 0 && dataset.train.is_empty() {
         problems.push(Finding::error(
             "there is no frame to train on: every frame is in the test or validation split; name the folder or the \
              file that lists the training frames",
