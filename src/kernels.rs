@@ -17,6 +17,7 @@ pub mod layer;
 pub mod lens;
 pub mod marching;
 mod memory;
+mod needs;
 pub mod occupancy;
 pub mod photos;
 mod shared;
@@ -24,10 +25,10 @@ pub mod training;
 pub mod viewing;
 mod workspace;
 
+pub use needs::Needs;
 pub use shared::{Camera, Counters, Step};
 pub use workspace::Workspace;
 
-use crate::camera::LensKind;
 use crate::config::{Accumulation, Background, ColorLoss, Config, Transmittance};
 use crate::gpu::Gpu;
 use crate::gpu::kernel::{Kernel, Shared};
@@ -35,8 +36,6 @@ use crate::gpu::source::Source;
 use crate::gpu::tensor::Memory;
 use crate::model::{DENSITY_OUTPUTS, Layout, Level};
 use anyhow::Result;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::fmt::Display;
 
 /// A file of WGSL under its name.
@@ -92,46 +91,6 @@ pub mod dispatch {
     pub const KEPT_TILES: usize = 4;
     /// How many there are.
     pub const COUNT: usize = 5;
-}
-
-/// What a scene needs, apart from the configuration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Needs {
-    /// The lenses that cameras have; at least one.
-    pub lenses: BTreeSet<LensKind>,
-    /// Some image has alpha.
-    pub alpha: bool,
-    /// Pixels are linear floats.
-    pub hdr: bool,
-    /// Some image has 16 bits.
-    pub deep: bool,
-    /// Some pixels are ignored.
-    pub masks: bool,
-    /// Depth is trained on.
-    pub depth: bool,
-    /// Scene-linear brightness that is 1 in the field: that of a typical pixel; 1 for images of 8 or 16 bits.
-    pub grey: f32,
-    /// Cascades of the occupancy grid; 1 for a bounded scene.
-    pub cascades: u32,
-    /// Training cameras.
-    pub cameras: usize,
-}
-
-impl Default for Needs {
-    /// One opaque 8-bit photo of a pinhole camera, of a bounded scene.
-    fn default() -> Self {
-        Self {
-            lenses: [LensKind::Pinhole].into(),
-            alpha: false,
-            hdr: false,
-            deep: false,
-            masks: false,
-            depth: false,
-            grey: 1.0,
-            cascades: 1,
-            cameras: 1,
-        }
-    }
 }
 
 /// Added to the squared colour that an error is relative to, as in tiny-cuda-nn's RelativeL2.

@@ -28,14 +28,10 @@ impl Dataset {
         let root = folder_of(&sources[0].1);
         let mut located = Vec::new();
         let mut scene_box = None;
-        let mut dialect = "";
         let files: Vec<&Path> = sources.iter().map(|(_, path)| path.as_path()).collect();
         let listings = transforms::read(&files, &mut notes)?;
+        let dialect = listings.first().map_or("", |listing| listing.dialect);
         for ((split, _), listing) in sources.iter().zip(listings) {
-            let is_first = located.is_empty();
-            if is_first {
-                dialect = listing.dialect;
-            }
             // The training file speaks for the scene.
             scene_box = scene_box.or(listing.scene_box);
             located.extend(locate(listing, *split, &root, options.allow_missing, &mut notes)?);

@@ -1,0 +1,45 @@
+//! What a scene needs of the kernels: everything else is not linked.
+
+use crate::camera::LensKind;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// What a scene needs, apart from the configuration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Needs {
+    /// The lenses that cameras have; at least one.
+    pub lenses: BTreeSet<LensKind>,
+    /// Some image has alpha.
+    pub alpha: bool,
+    /// Pixels are linear floats.
+    pub hdr: bool,
+    /// Some image has 16 bits.
+    pub deep: bool,
+    /// Some pixels are ignored.
+    pub masks: bool,
+    /// Depth is trained on.
+    pub depth: bool,
+    /// Scene-linear brightness that is 1 in the field: that of a typical pixel; 1 for images of 8 or 16 bits.
+    pub grey: f32,
+    /// Cascades of the occupancy grid; 1 for a bounded scene.
+    pub cascades: u32,
+    /// Training cameras.
+    pub cameras: usize,
+}
+
+impl Default for Needs {
+    /// One opaque 8-bit photo of a pinhole camera, of a bounded scene.
+    fn default() -> Self {
+        Self {
+            lenses: [LensKind::Pinhole].into(),
+            alpha: false,
+            hdr: false,
+            deep: false,
+            masks: false,
+            depth: false,
+            grey: 1.0,
+            cascades: 1,
+            cameras: 1,
+        }
+    }
+}
