@@ -16,7 +16,8 @@ use super::{BitDepth, Header, Image, Pixels, check_count, check_size, of_file};
 use crate::file::write_atomically;
 
 /// Said of what the decoder does not take.
-const DAMAGED: &str = "the file is damaged or incomplete, or uses a rare variant of its format; copy it again, or export it again";
+const DAMAGED: &str = "the file is damaged or incomplete, or uses a rare variant of its format; copy it again, or \
+                       export it again";
 
 /// What [`write_exr`] stores, each `[height * width]`.
 #[derive(Clone, Copy, Debug)]

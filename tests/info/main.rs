@@ -46,7 +46,10 @@ fn real_datasets_raise_no_false_alarm() {
         ("lego_100", &[][..]),
         ("stitch_200", &[]),
         ("fox_270x480", &["17 of 67 listed images are missing"]),
-        ("nerfstudio_lego_test", &["1 frame shows the same picture as another frame"]),
+        (
+            "nerfstudio_lego_test",
+            &["there is a single image to train on", "1 frame shows the same picture as another frame"],
+        ),
         ("brush_test_dataset", &["`fl_x` is 50.00", "`fl_y` is 50.00", "there is a single image"]),
     ] {
         let Some(path) = shared(&format!("data/{name}")) else { return };
