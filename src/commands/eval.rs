@@ -9,7 +9,7 @@ use nerf::camera::LensKind;
 use nerf::dataset::{Dataset, Split};
 use nerf::image::write_png_rgba8;
 use nerf::picture::{ColorSpace, opaque_srgb8};
-use nerf::words::few;
+use nerf::words::{count, few};
 use serde_json::{Value, json};
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
@@ -114,9 +114,8 @@ fn describe(args: &Eval, scores: &[Score], means: Means, color_space: ColorSpace
         .collect();
     let encoding = if color_space == ColorSpace::Linear { ", sRGB-encoded and clamped" } else { "" };
     lines.push(format!(
-        "mean of {} {} views over {}{encoding}: {:.3} dB  SSIM {:.4}",
-        means.views,
-        format!("{:?}", args.split).to_lowercase(),
+        "mean of {} over {}{encoding}: {:.3} dB  SSIM {:.4}",
+        count(means.views, &format!("{} view", args.split.split().name())),
         args.background.name(),
         means.psnr,
         means.ssim

@@ -16,7 +16,7 @@ use nerf::model::finest_resolution;
 use nerf::orbit::Orbit;
 use nerf::schedule::Budget;
 use nerf::train::State;
-use nerf::words::few;
+use nerf::words::{count, few};
 use std::fmt::Display;
 use std::path::Path;
 
@@ -95,7 +95,8 @@ impl Setup {
     /// Says what was chosen, and what was left out.
     pub(in crate::commands) fn describe(&self, gpu: &Gpu, remarks: Remarks) {
         let About { config, budget, bounds, .. } = &self.about;
-        remarks.say(&format!("{} views to train on, {} to measure on", self.train.len(), self.test.len()));
+        let train = count(self.train.len(), "view");
+        remarks.say(&format!("{train} to train on, {} to measure on", self.test.len()));
         remarks.detail(&format!(
             "scene box: centre {:.4}, half side {:.4}, {} cascades; {}",
             bounds.center, bounds.half, bounds.cascades, bounds.source
