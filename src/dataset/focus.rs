@@ -37,6 +37,11 @@ impl Axis {
         }
     }
 
+    /// A bare axis along a unit direction, with a right angle of view.
+    pub(crate) fn along(origin: DVec3, direction: DVec3) -> Self {
+        Self { origin, direction, half_width: 0.0, tan_half: 1.0 }
+    }
+
     /// Half the larger side of the view at a distance, in world units.
     pub(crate) fn half_width_at(&self, distance: f64) -> f64 {
         self.half_width + distance * self.tan_half

@@ -1,8 +1,9 @@
 //! Files whose rotations are mirrored: determinant -1 where a rotation has +1.
 
 use anyhow::{Result, ensure};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::DAffine3;
 
+use crate::dataset::focus::{Axis, FocusKind, find};
 use crate::dataset::notes::Notes;
 use crate::dataset::transforms::{Entry, Listing};
 use crate::words::few;
@@ -32,8 +33,7 @@ pub(in crate::dataset) fn settle(listings: &mut [Listing], notes: &mut Notes) ->
         return Ok(());
     }
     let entries = || listings.iter().flat_map(|listing| &listing.frames);
-    let agreement = Convergence::of(&entries().collect::<Vec<_>>());
-    if agreement.is_some_and(|axes| axes.in_front >= 0.8 && axes.miss < axes.distance) {
+    if meet_in_front(&entries().collect::<Vec<_>>()) {
         for entry in listings.iter_mut().flat_map(|listing| &mut listing.frames) {
             entry.world_from_camera.matrix3.z_axis *= -1.0;
         }
@@ -70,43 +70,18 @@ fn leave_out(entries: &[&Entry], mirrored: bool, notes: &mut Notes) {
     ));
 }
 
-/// How the third columns of the poses meet.
-#[derive(Clone, Copy)]
-struct Convergence {
-    /// Share of the cameras that have the meeting point on the positive side of the axis.
-    in_front: f64,
-    /// Mean distance of the axes from it, world units.
-    miss: f64,
-    /// Mean distance along the axes, world units.
-    distance: f64,
-}
-
-impl Convergence {
-    /// `None` for fewer than three cameras, where the axes are too parallel to meet, and for cameras that
-    /// look everywhere.
-    fn of(entries: &[&Entry]) -> Option<Self> {
-        let poses = || entries.iter().map(|entry| entry.world_from_camera);
-        let count = entries.len() as f64;
-        let across = |pose: DAffine3| {
-            let axis = pose.matrix3.z_axis;
-            DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z)
-        };
-        // The point nearest to all axes: the sum of the projections across them is inverted.
-        let sum = poses().fold(DMat3::ZERO, |sum, pose| sum + across(pose));
-        let looks_everywhere = entries.iter().any(|entry| entry.intrinsics.is_whole_sphere());
-        if entries.len() < 3 || looks_everywhere || sum.determinant() < 1e-3 * count.powi(3) {
-            return None;
-        }
-        let target = poses().fold(DVec3::ZERO, |sum, pose| sum + across(pose) * pose.translation);
-        let point = sum.inverse() * target;
-        let along = |pose: DAffine3| (point - pose.translation).dot(pose.matrix3.z_axis);
-        let miss = poses().map(|pose| (across(pose) * (point - pose.translation)).length());
-        Some(Self {
-            in_front: poses().filter(|&pose| along(pose) > 0.0).count() as f64 / count,
-            miss: miss.sum::<f64>() / count,
-            distance: poses().map(|pose| along(pose).abs()).sum::<f64>() / count,
-        })
+/// Whether the third columns of the poses meet in front of the cameras. Two cameras do not tell, nor do those that see
+/// everything around them.
+fn meet_in_front(entries: &[&Entry]) -> bool {
+    if entries.len() < 3 || entries.iter().any(|entry| entry.intrinsics.is_whole_sphere()) {
+        return false;
     }
+    let pose = |entry: &&Entry| entry.world_from_camera;
+    let axis = |pose: DAffine3| Axis::along(pose.translation, pose.matrix3.z_axis);
+    let axes: Vec<Axis> = entries.iter().map(pose).map(axis).collect();
+    let focus = find(&axes);
+    let ahead = axes.iter().filter(|axis| axis.along_and_across(focus.point).0 > 0.0);
+    focus.kind == FocusKind::Crossing && 10 * ahead.count() >= 8 * axes.len()
 }
 
 #[cfg(test)]
