@@ -89,7 +89,7 @@ fn load(folder: &Path, count: usize) -> Result<()> {
     let gpu = Arc::new(Gpu::open(&adapter::choose(None)?)?);
     let cascades = dataset.bounds.cascades;
     let config = if gpu.is_cpu() { Config::for_cpu(cascades > 1)? } else { Config::default() };
-    let layout = Layout::new(&config, finest_resolution(config.grid.base, &dataset.bounds, &cameras));
+    let layout = Layout::new(&config, finest_resolution(&config.grid, &dataset.bounds, &cameras));
     let lenses = LensKind::among(&cameras);
     let needs = Needs { lenses, cascades, cameras: cameras.len(), ..Needs::default() };
     let plan = Plan::new(&gpu, config, layout, needs);

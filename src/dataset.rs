@@ -35,7 +35,7 @@ pub use photo::Photo;
 pub(crate) use photo::nothing_counts;
 pub use reading::{AlphaMode, Crop, Reading};
 pub use sidecars::DepthEntry;
-pub use splits::HoldOut;
+pub use splits::{HoldOut, evenly_spaced};
 
 /// A dataset: what is listed, what was found, and what was assumed.
 #[derive(Clone, Debug)]

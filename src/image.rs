@@ -187,15 +187,6 @@ impl Pixels {
 }
 
 impl BitDepth {
-    /// Bytes of one decoded pixel, four channels.
-    pub fn bytes_per_pixel(self) -> u64 {
-        match self {
-            Self::Eight => 4,
-            Self::Sixteen => 8,
-            Self::Float => 16,
-        }
-    }
-
     /// Bytes per pixel that decoding takes at its peak, the decoded pixels included. The most that any of the
     /// formats takes: 8-bit progressive JPEG keeps all coefficients (6) and its colours (3), TIFF hands over its
     /// own copy of everything.

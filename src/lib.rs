@@ -41,7 +41,7 @@
 //! let cameras: Vec<_> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
 //! let gpu = Arc::new(gpu::Gpu::open(&gpu::adapter::choose(None)?)?);
 //! let config = Config::default();
-//! let finest = model::finest_resolution(config.grid.base, &dataset.bounds, &cameras);
+//! let finest = model::finest_resolution(&config.grid, &dataset.bounds, &cameras);
 //! let layout = model::Layout::new(&config, finest);
 //! let needs = Needs {
 //!     lenses: LensKind::among(&cameras),

@@ -1,7 +1,7 @@
 //! The parameters of a field and their layout: levels of the grid, layers of the networks.
 
 use crate::camera::Camera;
-use crate::config::Config;
+use crate::config::{Config, Grid};
 use crate::dataset::Bounds;
 use crate::gpu_struct;
 
@@ -156,10 +156,13 @@ const MOST_CELLS_WITH_CASCADES: f64 = 4096.0;
 /// Most cells per axis of any scene.
 const MOST_CELLS: f64 = 65536.0;
 
-/// Cells per axis of the finest level when the configuration leaves them open: one and a half along what a
-/// pixel of the median training view covers at the box's centre.
+/// Cells per axis of the finest level: what the configuration says or, where it leaves them open, one and a half along
+/// what a pixel of the median training view covers at the box's centre.
 #[must_use]
-pub fn finest_resolution(base: u32, bounds: &Bounds, cameras: &[Camera]) -> u32 {
+pub fn finest_resolution(grid: &Grid, bounds: &Bounds, cameras: &[Camera]) -> u32 {
+    if grid.finest > 0 {
+        return grid.finest;
+    }
     let sharpness = |camera: &Camera| {
         camera.pixels_per_length(camera.position().distance(bounds.center).max(0.1 * bounds.half))
     };
@@ -168,7 +171,7 @@ pub fn finest_resolution(base: u32, bounds: &Bounds, cameras: &[Camera]) -> u32 
     let middle = pixels_per_length.get(cameras.len() / 2).copied().unwrap_or(0.0);
     let most = if bounds.cascades > 1 { MOST_CELLS_WITH_CASCADES } else { MOST_CELLS };
     let cells = CELLS_PER_PIXEL * 2.0 * bounds.outer_half() * middle;
-    (cells.min(most) as u32).max(base)
+    (cells.min(most) as u32).max(grid.base)
 }
 
 /// The project's integer hash (PCG, Jarzynski & Olano 2020), the same as in the kernels.
@@ -214,18 +217,19 @@ mod tests {
             world_from_camera: DAffine3::from_translation(DVec3::new(distance, 0.0, 0.0)),
         };
         let cameras = [camera(2.0), camera(4.0), camera(40.0)];
+        let open = |base| Grid { base, ..Grid::default() };
         let bounds = |cascades| Bounds { center: DVec3::ZERO, half: 1.0, cascades, source: String::new() };
         // 200 px / 4 = 50 pixels per unit, 100 across the box of side 2, 150 cells.
-        assert_eq!(finest_resolution(16, &bounds(1), &cameras), 150);
-        assert_eq!(finest_resolution(16, &bounds(3), &cameras), 600);
-        assert_eq!(finest_resolution(16, &bounds(8), &cameras), 4096);
-        assert_eq!(finest_resolution(256, &bounds(1), &cameras), 256);
-        assert_eq!(finest_resolution(16, &bounds(1), &[]), 16);
-        assert_eq!(finest_resolution(16, &bounds(1), &[camera(0.0)]), 6000);
+        assert_eq!(finest_resolution(&open(16), &bounds(1), &cameras), 150);
+        assert_eq!(finest_resolution(&open(16), &bounds(3), &cameras), 600);
+        assert_eq!(finest_resolution(&open(16), &bounds(8), &cameras), 4096);
+        assert_eq!(finest_resolution(&open(256), &bounds(1), &cameras), 256);
+        assert_eq!(finest_resolution(&open(16), &bounds(1), &[]), 16);
+        assert_eq!(finest_resolution(&open(16), &bounds(1), &[camera(0.0)]), 6000);
         // Parallel rays are as dense at any distance.
         let parallel = Camera { lens: Lens::Orthographic, ..camera(40.0) };
-        assert_eq!(finest_resolution(16, &bounds(1), &[parallel]), 600);
+        assert_eq!(finest_resolution(&open(16), &bounds(1), &[parallel]), 600);
         let sphere = Camera { lens: Lens::Equirectangular, ..camera(4.0) };
-        assert_eq!(finest_resolution(16, &bounds(1), &[sphere]), 150);
+        assert_eq!(finest_resolution(&open(16), &bounds(1), &[sphere]), 150);
     }
 }

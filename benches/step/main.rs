@@ -308,10 +308,7 @@ impl Throughput {
 
 fn trainer(gpu: &Arc<Gpu>, config: Config, dataset: &Dataset, images: &[Image]) -> Result<Trainer> {
     let cameras: Vec<Camera> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
-    let finest = match config.grid.finest {
-        0 => finest_resolution(config.grid.base, &dataset.bounds, &cameras),
-        finest => finest,
-    };
+    let finest = finest_resolution(&config.grid, &dataset.bounds, &cameras);
     let layout = Layout::new(&config, finest);
     let needs = Needs {
         lenses: LensKind::among(&cameras),

@@ -4,7 +4,7 @@ use super::scores::{Judge, Means, Score};
 use super::train::setup::Setup;
 use crate::remarks::Remarks;
 use anyhow::Result;
-use nerf::dataset::{Dataset, Photo};
+use nerf::dataset::{Dataset, Photo, evenly_spaced};
 use nerf::gpu::Gpu;
 use nerf::kernels::Workspace;
 use nerf::picture::ColorSpace;
@@ -47,8 +47,7 @@ impl<'a> Exam<'a> {
         let renderer = Renderer::new(gpu, &setup.plan, workspace, &setup.about.bounds, &needs.lenses)?;
         let color_space = ColorSpace::of(needs.hdr);
         let judge = Judge { renderer, color_space, background: [0.0; 3], dataset };
-        let count = setup.test.len().min(few);
-        let few: Vec<_> = (0..count).map(|i| setup.test[i * setup.test.len() / count]).collect();
+        let few = evenly_spaced(&setup.test, few);
         let mut photos = Vec::with_capacity(few.len());
         dataset.stream(&few, false, &mut |position, photo| {
             if !photo.is_ignored() {

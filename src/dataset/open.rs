@@ -83,7 +83,7 @@ impl Dataset {
 fn thin_out(train: &mut Vec<usize>, most: Option<usize>, notes: &mut Notes) {
     let count = train.len();
     if let Some(most) = most.filter(|&most| most < count) {
-        *train = (0..most).map(|i| train[i * count / most]).collect();
+        *train = splits::evenly_spaced(train, most);
         notes.note(format!("{most} of {count} frames are trained on, evenly spaced, as asked"));
     }
 }

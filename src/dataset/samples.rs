@@ -8,6 +8,7 @@ use super::bounds::Surroundings;
 use super::notes::Notes;
 use super::photo::How;
 use super::reading::{AlphaMode, Reading};
+use super::splits::evenly_spaced;
 use crate::image::{BitDepth, Evidence, Multiplied};
 
 /// Images that are looked at to tell what their alpha means.
@@ -32,8 +33,7 @@ impl Samples<'_> {
             return Ok(AlphaMode::Premultiplied);
         }
         let with_alpha: Vec<_> = self.frames.iter().filter(|frame| frame.has_own_alpha).collect();
-        let count = with_alpha.len().min(MOST);
-        let samples: Vec<_> = (0..count).map(|i| with_alpha[i * with_alpha.len() / count]).collect();
+        let samples = evenly_spaced(&with_alpha, MOST);
         let how = How { multiplied: Multiplied::Straight, ..How::new(self.bits, reading) };
         let look = |frame: &&&Frame| match frame.upright(how) {
             Ok(image) => Ok(image.evidence()),

@@ -21,6 +21,13 @@ impl Default for HoldOut {
     }
 }
 
+/// At most `most` of some items, evenly spaced from the first on.
+#[must_use]
+pub fn evenly_spaced<T: Copy>(items: &[T], most: usize) -> Vec<T> {
+    let count = items.len().min(most);
+    (0..count).map(|i| items[i * items.len() / count]).collect()
+}
+
 /// Indices of frames per split.
 #[derive(Debug, Default)]
 pub(super) struct Splits {

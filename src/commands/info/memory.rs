@@ -69,9 +69,7 @@ impl Estimate {
 }
 
 fn plan(traits: Traits, mut config: Config, needs: Needs, bounds: &Bounds, cameras: &[Camera]) -> Plan {
-    if config.grid.finest == 0 {
-        config.grid.finest = finest_resolution(config.grid.base, bounds, cameras);
-    }
+    config.grid.finest = finest_resolution(&config.grid, bounds, cameras);
     let layout = Layout::new(&config, config.grid.finest);
     Plan::suited_to(traits, config, layout, needs)
 }

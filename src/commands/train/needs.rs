@@ -3,7 +3,7 @@
 use anyhow::{Result, ensure};
 use nerf::camera::LensKind;
 use nerf::config::{Background, Config};
-use nerf::dataset::{Dataset, Frame};
+use nerf::dataset::{Dataset, Frame, evenly_spaced};
 use nerf::image::{BitDepth, Image};
 use nerf::kernels::Needs;
 
@@ -67,10 +67,8 @@ fn grey(dataset: &Dataset) -> Result<f32> {
     if !dataset.is_hdr {
         return Ok(1.0);
     }
-    let all = dataset.train.len();
-    let count = all.min(PHOTOS_FOR_GREY);
-    let few: Vec<_> = (0..count).map(|i| dataset.train[i * all / count]).collect();
-    let mut logs = Vec::with_capacity(count);
+    let few = evenly_spaced(&dataset.train, PHOTOS_FOR_GREY);
+    let mut logs = Vec::with_capacity(few.len());
     dataset.stream(&few, false, &mut |_, photo| {
         logs.extend(Image::grey(&photo.image).map(f64::ln));
         Ok(())

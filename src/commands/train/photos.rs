@@ -11,11 +11,6 @@ use nerf::views::Views;
 use nerf::words::{bytes, few};
 use std::sync::Arc;
 
-/// What the training takes of host and device.
-pub(in crate::commands) fn memory(setup: &Setup, dataset: &Dataset) -> Memory {
-    Memory::of_training(&setup.plan, &setup.cameras, dataset.stream_bytes(&setup.train))
-}
-
 /// Decodes the training photos, a few at a time, and puts them on the device, unless there is no room for them.
 pub(in crate::commands) fn load(
     setup: &Setup,
@@ -23,7 +18,7 @@ pub(in crate::commands) fn load(
     gpu: &Arc<Gpu>,
     remarks: Remarks,
 ) -> Result<Views> {
-    let memory = memory(setup, dataset);
+    let memory = Memory::of_training(&setup.plan, &setup.cameras, dataset.stream_bytes(&setup.train));
     let [host, device, photos] = [memory.host_bytes, memory.device_bytes, memory.photo_bytes].map(bytes);
     remarks.say(&format!("memory: {host} on the host, {device} on the device, {photos} of it photos"));
     memory.check(gpu, &setup.plan)?;

@@ -151,9 +151,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
     let defaults = defaults(gpu.is_cpu(), dataset)?;
     let mut config = configure(defaults, wishes)?;
     let cameras = cameras(dataset, &dataset.train);
-    if config.grid.finest == 0 {
-        config.grid.finest = finest_resolution(config.grid.base, &bounds, &cameras);
-    }
+    config.grid.finest = finest_resolution(&config.grid, &bounds, &cameras);
     let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
     let orbit = Orbit::of(&cameras, bounds.center);
     let needs = needs::of(dataset, &config)?;
