@@ -6,10 +6,10 @@ tensor<read> samples: vec4<f32>;
 tensor<read> density_out: vec4<f32>;
 var<storage, read> ray_spans: array<vec2<u32>>;
 var<storage, read> kept_spans: array<vec2<u32>>;
-tensor<read> chosen: vec2<u32>;
+tensor<read> chosen: vec4<f32>;
 // Sample and ray.
 tensor<write> kept_rows: vec2<u32>;
-// Log-density and step length.
+// Log-density, step length, optical depth left out in front of it, and gain.
 tensor<write> kept_steps: vec4<f32>;
 
 @compute @workgroup_size(64)
@@ -22,9 +22,9 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let span = kept_spans[index];
     for (var i = 0u; i < span.y; i++) {
         let choice = chosen_load(first + i);
-        kept_rows_store(span.x + i, vec2(choice.x, index));
-        let log_density = density_log(density_out_load(choice.x * DENSITY_QUADS).x);
-        let delta = samples_load(choice.x).w * bitcast<f32>(choice.y);
-        kept_steps_store(span.x + i, vec4(log_density, delta, 0.0, 0.0));
+        let sample = u32(choice.x);
+        kept_rows_store(span.x + i, vec2(sample, index));
+        let log_density = density_log(density_out_load(sample * DENSITY_QUADS).x);
+        kept_steps_store(span.x + i, vec4(log_density, samples_load(sample).w, choice.y, choice.z));
     }
 }

@@ -27,7 +27,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var i = span.x; i < span.x + span.y; i++) {
         let step = kept_steps_load(i);
         let tau = optical_depth(step.x, step.y);
-        let weight = exp_accurate(-transmittance_depth(depth, tau)) * opacity(tau);
+        depth += step.z;
+        let weight = step.w * exp_accurate(-transmittance_depth(depth, tau)) * opacity(tau);
         sum += weight * vec4(color_load(i).rgb, 1.0);
         distance += weight * lens_depth(camera, samples_load(kept_rows_load(i).x).xyz - camera.origin);
         depth += tau;

@@ -112,11 +112,12 @@ pub struct Batch {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Selection {
-    /// Samples of at least this weight are always kept.
+    /// Samples of at least this weight are kept; lighter ones form groups of about this weight, of which one stands
+    /// for all. 0 keeps every sample.
     pub weight_floor: f64,
-    /// Least probability that a lighter sample is kept, which is its share of the floor otherwise; its step is
-    /// divided by the probability, since it stands for those left out.
-    pub keep_probability: f64,
+    /// A group whose weight stays below this share of the floor is kept with a probability in proportion to its weight.
+    #[serde(alias = "keep_probability")]
+    pub light_share: f64,
     /// A ray ends where its transmittance falls below this.
     pub stop_transmittance: f64,
 }
@@ -240,7 +241,7 @@ impl Default for Batch {
 
 impl Default for Selection {
     fn default() -> Self {
-        Self { weight_floor: 1e-3, keep_probability: 0.2, stop_transmittance: 1e-4 }
+        Self { weight_floor: 5e-3, light_share: 0.125, stop_transmittance: 1e-4 }
     }
 }
 
@@ -358,8 +359,8 @@ impl Config {
         real("march.near", march.near, 0.0, 10.0)?;
         real("occupancy.decay", occupancy.decay, 0.0, 1.0)?;
         real("occupancy.threshold", occupancy.threshold, 0.0, 1e6)?;
-        real("selection.weight_floor", selection.weight_floor, 1e-12, 1.0)?;
-        real("selection.keep_probability", selection.keep_probability, 0.0, 1.0)?;
+        real("selection.weight_floor", selection.weight_floor, 0.0, 1.0)?;
+        real("selection.light_share", selection.light_share, 0.0, 1.0)?;
         real("selection.stop_transmittance", selection.stop_transmittance, 0.0, 0.5)?;
         real("loss.depth", loss.depth, 0.0, 1e6)?;
         real("optimizer.learning_rate", optimizer.learning_rate, 0.0, 1e3)?;

@@ -69,10 +69,12 @@ pub mod dimension {
     pub const PIXEL: u32 = 1;
     /// Where its first sample lies.
     pub const OFFSET: u32 = 2;
-    /// Which of its samples are kept.
+    /// Which of a group of light samples stands for it.
     pub const SELECTION: u32 = 3;
     /// Red, green and blue of its background, in this dimension and the next two.
     pub const BACKGROUND: u32 = 4;
+    /// Whether the lightest groups are kept.
+    pub const LIGHT: u32 = 7;
     /// Position in a cell of the occupancy grid, in this dimension and the next two.
     pub const CELL: u32 = 8;
 }
@@ -289,6 +291,7 @@ impl Plan {
             ("RANDOM_PIXEL", dimension::PIXEL as usize),
             ("RANDOM_OFFSET", dimension::OFFSET as usize),
             ("RANDOM_SELECTION", dimension::SELECTION as usize),
+            ("RANDOM_LIGHT", dimension::LIGHT as usize),
             ("RANDOM_BACKGROUND", dimension::BACKGROUND as usize),
             ("RANDOM_CELL", dimension::CELL as usize),
         ];
@@ -304,7 +307,7 @@ impl Plan {
             ("LOG_CONE", config.march.cone.ln_1p()),
             ("DENSITY_SCALE", self.density_scale()),
             ("T_NEAR", config.march.near / self.density_scale()),
-            ("KEEP_PROBABILITY", config.selection.keep_probability.max(1e-6)),
+            ("LIGHT_SHARE", config.selection.light_share.max(1e-6)),
             ("STOP_TRANSMITTANCE", config.selection.stop_transmittance),
             ("OCCUPANCY_DECAY", config.occupancy.decay),
             ("OCCUPANCY_THRESHOLD", config.occupancy.threshold),

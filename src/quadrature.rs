@@ -25,7 +25,7 @@ pub mod order;
 
 use crate::reference::Transmittance;
 use crate::reference::composite::{CompositeInput, composite};
-use crate::reference::selection::{Selection, select};
+use crate::reference::selection::{Luck, Selection, select};
 
 /// Log-density of nothing: its optical depth is 10⁻²⁶ per unit of length.
 const EMPTY: f64 = -60.0;
@@ -191,8 +191,8 @@ impl Samples {
     #[must_use]
     pub fn render(&self, convention: Transmittance, stop: f64) -> [f64; 4] {
         let delta = vec![self.delta; self.s.len()];
-        let all = Selection { stop_transmittance: stop, floor: 1.0, probability: 1.0 };
-        let kept = select(&all, &self.s, &delta, 0.0).len();
+        let all = Selection { stop_transmittance: stop, floor: 0.0, light_share: 1.0 };
+        let kept = select(&all, &self.s, &delta, |_| Luck { member: 0.0, light: 0.0 }).1;
         let ray = CompositeInput {
             s: &self.s[..kept],
             delta: &delta[..kept],

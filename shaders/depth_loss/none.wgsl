@@ -1,4 +1,4 @@
-// Needs: sum. Provides: the depth's share of the loss where it has none.
+// Needs: Passage. Provides: the depth's share of the loss where it has none.
 
 struct DepthRay {
     unused: u32,
@@ -20,10 +20,10 @@ fn depth_squared_error(depth: DepthRay) -> f32 {
     return 0.0;
 }
 
-fn depth_gradient(depth: DepthRay, i: u32, alpha: f32) -> f32 {
+fn depth_gradient(depth: DepthRay, i: u32, alpha: f32, missing: f32) -> f32 {
     return 0.0;
 }
 
-fn depth_backward(depth: DepthRay, i: u32, tau: f32, alpha: f32, passing_root: f32, zero: u32) -> DepthRay {
+fn depth_backward(depth: DepthRay, i: u32, part: Passage, zero: u32) -> DepthRay {
     return depth;
 }

@@ -52,12 +52,13 @@ fn depth_squared_error(depth: DepthRay) -> f32 {
 }
 
 // The channel's part of dL/ds_i, but for tau and T.
-fn depth_gradient(depth: DepthRay, i: u32, alpha: f32) -> f32 {
-    return depth.d_result * gradient_color(alpha, depth_offset(depth, i), depth.sum).x;
+fn depth_gradient(depth: DepthRay, i: u32, alpha: f32, missing: f32) -> f32 {
+    let offset = depth_offset(depth, i);
+    return depth.d_result * (gradient_color(alpha, offset, depth.sum).x - missing * offset.x);
 }
 
-fn depth_backward(depth: DepthRay, i: u32, tau: f32, alpha: f32, passing_root: f32, zero: u32) -> DepthRay {
+fn depth_backward(depth: DepthRay, i: u32, part: Passage, zero: u32) -> DepthRay {
     var next = depth;
-    next.sum = behind_next(depth.sum, depth_offset(depth, i), tau, alpha, passing_root, zero);
+    next.sum = behind_next(depth.sum, depth_offset(depth, i), part, zero);
     return next;
 }

@@ -137,7 +137,7 @@ impl Ray {
             true => self.distances.iter().map(|t| t - self.goal).collect(),
             false => Vec::new(),
         };
-        let want = composite_with(objective.loss, objective.transmittance, &input, &offsets);
+        let want = composite_with(objective.loss, objective.transmittance, &input, &offsets, &[]);
         let scales = Scales::new(objective, &input, &want, &offsets);
         let case = |what: &str| format!("ray {number}, {what}");
         for (x, &error) in errors.iter().enumerate().take(3) {

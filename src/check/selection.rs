@@ -5,8 +5,9 @@ use super::{Kept, Setup, Subject, Tally, Workbench};
 use crate::gpu::pass::Stage;
 use crate::kernels::{color, dimension};
 use crate::reference::activation::{MAX_LOG_DENSITY, log_density};
+use crate::reference::composite::optical_depth;
 use crate::reference::model::TrainingRay;
-use crate::reference::selection::{self, select};
+use crate::reference::selection::{self, Luck, select};
 use anyhow::Result;
 
 /// The stages of [`color::stages`] up to the packed samples.
@@ -20,8 +21,7 @@ pub struct Selecting {
     stages: Vec<Stage>,
 }
 
-/// Chosen samples and the steps they stand for: of ordinary rays, of a fog in which most end, by weight alone, and
-/// all.
+/// Chosen samples and what they stand for: of ordinary rays, of a fog in which most end, with a high floor, and all.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
@@ -36,21 +36,21 @@ pub fn selected_samples(subject: &Subject) -> Result<Tally> {
         ordinary.compare(&mut tally, &rays, &raw)?;
     }
     let mut dense = setup();
-    dense.config.selection.keep_probability = 1.0;
+    dense.config.selection.weight_floor = 0.0;
     let dense = Selecting::new(subject, dense)?;
     let rays = random_batch(&mut random, 60, 380);
     let kept = dense.compare(&mut tally, &rays, &random.numbers(380, 2.0, 3.0))?;
     tally.holds(kept < 380, || "no ray ends in a fog".into());
-    for probability in [0.0, 1.0] {
+    for (floor, light_share) in [(1.0, 1.0), (0.05, 0.01), (0.0, 1.0)] {
         let mut setup = setup();
-        setup.config.selection.keep_probability = probability;
-        setup.config.selection.weight_floor = 1.0;
+        setup.config.selection.light_share = light_share;
+        setup.config.selection.weight_floor = floor;
         setup.config.selection.stop_transmittance = 0.0;
         let selecting = Selecting::new(subject, setup)?;
         let rays = random_batch(&mut random, 33, 130);
         let raw: Vec<f32> = raw_densities(&mut random, 130).into_iter().map(|raw| raw.min(0.0)).collect();
         let kept = selecting.compare(&mut tally, &rays, &raw)?;
-        tally.holds((kept == 130) == (probability == 1.0), || format!("{kept} kept at {probability}"));
+        tally.holds((kept == 130) == (floor == 0.0), || format!("{kept} kept with a floor of {floor}"));
     }
     Ok(tally)
 }
@@ -58,8 +58,8 @@ pub fn selected_samples(subject: &Subject) -> Result<Tally> {
 /// A selection like the default one, of numbers that f32 holds.
 fn setup() -> Setup {
     let mut setup = Setup::tiny();
-    setup.config.selection.weight_floor = f64::from(1e-3_f32);
-    setup.config.selection.keep_probability = f64::from(0.2_f32);
+    setup.config.selection.weight_floor = f64::from(0.02_f32);
+    setup.config.selection.light_share = 0.125;
     setup.config.selection.stop_transmittance = f64::from(1e-4_f32);
     setup
 }
@@ -126,25 +126,29 @@ impl Selecting {
     }
 
     /// What the reference keeps of a ray; `None` where rounding may decide.
-    fn reference(&self, &Chosen { number, ray, raw, .. }: &Chosen<'_>) -> Option<Vec<selection::Kept>> {
+    fn reference(&self, &Chosen { ray, raw, first, .. }: &Chosen<'_>) -> Option<Vec<selection::Kept>> {
         let config = &self.bench.plan.config.selection;
         let selection = selection::Selection {
             stop_transmittance: config.stop_transmittance,
             floor: config.weight_floor,
-            probability: config.keep_probability,
+            light_share: config.light_share,
         };
         let s: Vec<f64> = raw.iter().map(|&raw| log_density(f64::from(raw))).collect();
         let delta: Vec<f64> = ray.samples.iter().map(|sample| sample.delta).collect();
-        let u = uniform(number, dimension::SELECTION);
-        let want = select(&selection, &s, &delta, u);
+        let luck = |index: usize, nudge: f64| Luck {
+            member: uniform(first + index, dimension::SELECTION) + nudge,
+            light: uniform(first + index, dimension::LIGHT) + nudge,
+        };
+        let (want, _) = select(&selection, &s, &delta, |index| luck(index, 0.0));
         // A little more or less luck, or light, must not change the choice.
         let indices = |kept: &[selection::Kept]| kept.iter().map(|kept| kept.index).collect::<Vec<_>>();
         for nudge in [-1e-4, 1e-4] {
             let stop_transmittance = selection.stop_transmittance * (1.0 + nudge);
             let floor = selection.floor * (1.0 + nudge);
             let other = selection::Selection { stop_transmittance, floor, ..selection };
-            for u in [u - 1e-5, u + 1e-5] {
-                if indices(&select(&other, &s, &delta, u)) != indices(&want) {
+            for nudge in [-1e-5, 1e-5] {
+                let (nudged, _) = select(&other, &s, &delta, |index| luck(index, nudge));
+                if indices(&nudged) != indices(&want) {
                     return None;
                 }
             }
@@ -179,9 +183,18 @@ impl Chosen<'_> {
         let same = samples.eq(want.iter().map(|kept| first + kept.index));
         tally.holds(same, || format!("{}: other samples than {want:?}", case()));
         if same {
+            let depths: Vec<f64> = (raw.iter().zip(&ray.samples))
+                .map(|(&raw, sample)| optical_depth(log_density(f64::from(raw)), sample.delta))
+                .collect();
+            let mut behind = 0;
             for (got, want) in self.kept.iter().zip(&want) {
-                let delta = want.gain * ray.samples[want.index].delta;
+                let delta = ray.samples[want.index].delta;
                 tally.value(got.delta.into(), delta, delta, || format!("{}: step", case()));
+                tally.value(got.gain.into(), want.gain, 1.0 + want.gain, || format!("{}: gain", case()));
+                let gap: f64 = depths[behind..want.index].iter().sum();
+                let before: f64 = depths[..want.index].iter().sum();
+                tally.value(got.gap.into(), gap, 1.0 + before, || format!("{}: gap", case()));
+                behind = want.index + 1;
             }
         }
         true

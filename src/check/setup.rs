@@ -38,7 +38,7 @@ impl Setup {
             march: March { steps: 64, cone: 1.0 / 32.0, most_steps: 96, near: 0.05 },
             occupancy: Occupancy { cells: 16, ..Occupancy::default() },
             batch: Batch { kept: 256, samples: 512, rays: 256, first_rays: 64 },
-            selection: Selection { weight_floor: 1e-12, keep_probability: 1.0, stop_transmittance: 0.0 },
+            selection: Selection { weight_floor: 0.0, light_share: 1.0, stop_transmittance: 0.0 },
             optimizer: Optimizer { beta_1: 0.0, l2: 0.0, ..Optimizer::default() },
             seed: SEED,
             ..Config::default()

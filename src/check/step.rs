@@ -8,8 +8,11 @@ use crate::config::{Background, Optimizer, Selection};
 use crate::dataset::{Bounds, Photo};
 use crate::image::{Image, Pixels};
 use crate::kernels::Needs;
+use crate::model::DENSITY_OUTPUTS;
 use crate::reference::Transmittance;
+use crate::reference::activation::log_density;
 use crate::reference::adam::Adam;
+use crate::reference::composite::optical_depth;
 use crate::reference::model::{BatchOutput, Model, Objective, RaySample, TrainingRay};
 use crate::reference::step::Training;
 use crate::train::{StepStats, Trainer};
@@ -63,13 +66,16 @@ pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
         let mut reference = tiny.reference()?;
         let before = reference.model.clone();
         let (stats, batch) = tiny.step()?;
-        let samples: usize = batch.iter().map(|ray| ray.samples.len()).sum();
+        let kept = |ray: &TrainingRay| ray.samples.iter().filter(|sample| sample.gain > 0.0).count();
+        let samples: usize = batch.iter().map(kept).sum();
         let counted = [stats.steps, stats.skipped] == [1, 0]
             && stats.rays == batch.len() as u64
             && stats.samples == samples as u64;
         tally.holds(counted, || format!("{name}: {stats:?}, {} rays, {samples} samples", batch.len()));
         let filled = batch.len() >= 16 && batch.iter().any(|ray| ray.samples.len() > 3);
-        tally.holds(filled && tiny.lengthened()? > 3, || format!("{name}: a thin batch"));
+        let thinned =
+            reference.objective.transmittance == Transmittance::Inclusive || tiny.representatives()? > 3;
+        tally.holds(filled && thinned, || format!("{name}: a thin batch"));
         let want = reference.step(&batch, LEARNING_RATE);
         tally.value(stats.loss, want.loss, want.loss, || format!("{name}: loss"));
         let error = color_error(&want, &batch, reference.objective);
@@ -157,8 +163,7 @@ impl TinyTraining {
         setup.needs.cameras = cameras.len();
         setup.config.optimizer = Optimizer::default();
         // High enough that every batch has light samples, of which some are dropped.
-        setup.config.selection =
-            Selection { weight_floor: 0.05, keep_probability: 0.5, stop_transmittance: 1e-4 };
+        setup.config.selection = Selection { weight_floor: 0.05, light_share: 0.5, stop_transmittance: 1e-4 };
         setup.config.batch.kept = 1024;
         setup.config.batch.samples = 4096;
         let mut random = Random::new(80);
@@ -202,22 +207,23 @@ impl TinyTraining {
     }
 
     /// How many of the last step's kept samples stand for others too.
-    fn lengthened(&self) -> Result<usize> {
-        let counters = self.bench.counters()?;
-        let samples: Vec<[f32; 4]> = self.bench.read("samples", counters.samples as usize)?;
-        let kept = self.bench.kept(counters.kept as usize)?;
-        let step = |sample: u32| samples.get(sample as usize).map_or(f32::MAX, |sample| sample[3]);
-        Ok(kept.iter().filter(|kept| kept.delta > 1.01 * step(kept.sample)).count())
+    fn representatives(&self) -> Result<usize> {
+        let kept = self.bench.kept(self.bench.counters()?.kept as usize)?;
+        Ok(kept.iter().filter(|kept| kept.gain > 1.01).count())
     }
 
-    /// The kept samples of the last step, its targets and backgrounds.
+    /// The samples of the last step up to where each ray ends, its targets and backgrounds.
     fn batch(&self) -> Result<Vec<TrainingRay>> {
         let bench = &self.bench;
         let counters = bench.counters()?;
         let rays = counters.rays_used as usize;
         let samples: Vec<[f32; 4]> = bench.read("samples", counters.samples as usize)?;
-        let kept = bench.kept(counters.kept as usize)?;
-        let spans: Vec<[u32; 2]> = bench.read("kept_spans", rays)?;
+        let mut gains = vec![0.0; samples.len()];
+        for kept in bench.kept(counters.kept as usize)? {
+            gains[kept.sample as usize] = f64::from(kept.gain);
+        }
+        let density = bench.density(samples.len())?;
+        let spans: Vec<[u32; 2]> = bench.read("ray_spans", rays)?;
         let directions = bench.rays(rays)?;
         let targets: Vec<[f32; 4]> = bench.read("targets", rays)?;
         let backgrounds: Vec<[f32; 4]> = bench.read("backgrounds", rays)?;
@@ -227,15 +233,25 @@ impl TinyTraining {
         };
         let scale = bench.plan.density_scale();
         let vector = |x: &[f32; 4]| DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
-        let sample = |kept: &super::Kept, ray: usize| {
-            let position = samples.get(kept.sample as usize).map_or(DVec3::NAN, vector);
+        let sample = |index: usize, ray: usize| {
+            let position = vector(&samples[index]);
             let [origin, direction] = directions[ray].each_ref().map(vector);
             let distance = (position - origin).dot(direction) * scale;
-            RaySample { position, delta: f64::from(kept.delta), gain: 1.0, distance }
+            RaySample { position, delta: f64::from(samples[index][3]), gain: gains[index], distance }
         };
-        let of_ray = |ray: usize| {
+        let stop = bench.plan.config.selection.stop_transmittance;
+        let of_ray = |ray: usize| -> Vec<RaySample> {
             let [first, count] = spans[ray].map(|x| x as usize);
-            kept.iter().skip(first).take(count).map(|kept| sample(kept, ray)).collect()
+            let mut before = 0.0;
+            (first..first + count)
+                .take_while(|&index| {
+                    let is_reached = f64::exp(-before) >= stop;
+                    let s = log_density(f64::from(density[index * DENSITY_OUTPUTS]));
+                    before += optical_depth(s, f64::from(samples[index][3]));
+                    is_reached
+                })
+                .map(|index| sample(index, ray))
+                .collect()
         };
         Ok((0..rays)
             .map(|ray| TrainingRay {

@@ -38,8 +38,12 @@ pub struct Kept {
     pub ray: u32,
     /// Log-density.
     pub s: f32,
-    /// Step, as long as that of all the samples it stands for.
+    /// Step.
     pub delta: f32,
+    /// Optical depth of what was left out in front of it.
+    pub gap: f32,
+    /// How many times its own weight its colour has.
+    pub gain: f32,
 }
 
 /// What one pass over a batch left on the device.
@@ -155,13 +159,13 @@ impl Workbench {
         let rows: Vec<[u32; 2]> = self.read("kept_rows", count)?;
         let steps: Vec<[f32; 4]> = self.read("kept_steps", count)?;
         Ok((rows.into_iter().zip(steps))
-            .map(|([sample, ray], [s, delta, ..])| Kept { sample, ray, s, delta })
+            .map(|([sample, ray], [s, delta, gap, gain])| Kept { sample, ray, s, delta, gap, gain })
             .collect())
     }
 
-    /// Log-densities and steps of the kept samples, as if they had been chosen.
+    /// Log-densities and steps of the kept samples, as if all had been chosen.
     pub fn set_kept_steps(&self, steps: &[[f32; 2]]) {
-        self.write("kept_steps", &steps.iter().map(|&[s, delta]| [s, delta, 0.0, 0.0]).collect::<Vec<_>>());
+        self.write("kept_steps", &steps.iter().map(|&[s, delta]| [s, delta, 0.0, 1.0]).collect::<Vec<_>>());
     }
 
     /// Puts a batch on the device as if it had been drawn and marched.

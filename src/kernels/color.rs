@@ -3,6 +3,7 @@
 use super::density::{forward, layer_stage};
 use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
 use super::{COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, Plan, RANDOM, STEP, Workspace, dispatch};
+use crate::config::Transmittance;
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::{Size, Stage};
@@ -26,7 +27,8 @@ pub enum Selection {
 pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     let rows = kept_capacity(&plan.config.batch) + SPARE_ROWS;
     let mut demands = vec![
-        plan.tensor("chosen", Element::Pair, plan.config.batch.samples),
+        plan.tensor("chosen", Element::Vec4, plan.config.batch.samples),
+        Demand::storage::<f32>("ray_tails", plan.config.batch.rays),
         plan.tensor("kept_rows", Element::Pair, rows),
         plan.tensor("kept_steps", Element::Vec4, rows),
         plan.tensor("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
@@ -42,6 +44,8 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
     let floor = match selection {
+        // Its weights are no shares of one whole, so that none can stand for others.
+        Selection::Training if plan.config.transmittance == Transmittance::Inclusive => 0.0,
         Selection::Training => plan.config.selection.weight_floor as f32,
         // Whatever is lighter does not show in 32 bits.
         Selection::All => 1e-12,

@@ -19,7 +19,8 @@
 //! derivative is that of a colour.
 
 use super::Transmittance;
-use super::composite::{CompositeInput, CompositeOutput, composite, d_rendered_by_s};
+use super::composite::{CompositeInput, CompositeOutput, composite};
+use super::selection::thin;
 
 /// Added to the squared colour that an error is relative to.
 pub const RELATIVE_FLOOR: f64 = 0.01;
@@ -51,14 +52,20 @@ impl Loss {
 }
 
 /// Composites a ray whose samples lie `offsets` behind the known depth, `t_i − g_t`; without offsets the depth is
-/// not known. The loss terms are those of the colour and the opacity, with their weights.
+/// not known. `gains` are those of [`thin`]; without them all samples are kept. The loss terms are those of the colour
+/// and the opacity, with their weights.
 pub fn composite_with(
     loss: Loss,
     convention: Transmittance,
     ray: &CompositeInput,
     offsets: &[f64],
+    gains: &[f64],
 ) -> CompositeOutput {
     let mut output = composite(convention, ray);
+    let all = vec![1.0; ray.s.len()];
+    let gains = if gains.is_empty() { &all } else { gains };
+    let thinned = thin(convention, ray, gains);
+    (output.rendered, output.weights) = (thinned.rendered, thinned.weights);
     let m = f64::from(ray.rays_in_batch.max(1));
     let weights = loss.weights(output.rendered, ray.target);
     let residual: [f64; 4] = std::array::from_fn(|x| output.rendered[x] - ray.target[x]);
@@ -67,10 +74,10 @@ pub fn composite_with(
     let d_rendered: [f64; 4] = std::array::from_fn(|x| weights[x] * residual[x] / (2.0 * m));
     let w = &output.weights;
     output.d_color = w.iter().map(|w| std::array::from_fn(|x| d_rendered[x] * w)).collect();
-    let by_s = d_rendered_by_s(convention, ray);
-    output.d_s = by_s.iter().map(|by_s| (0..4).map(|x| d_rendered[x] * by_s[x]).sum()).collect();
+    let by_s = thinned.by_s.iter();
+    output.d_s = by_s.map(|by_s| (0..4).map(|x| d_rendered[x] * by_s[x]).sum()).collect();
     if !offsets.is_empty() {
-        add_depth(loss.depth / m, convention, ray, offsets, &mut output);
+        add_depth(loss.depth / m, convention, ray, (offsets, gains), &mut output);
     }
     output
 }
@@ -80,14 +87,14 @@ fn add_depth(
     share: f64,
     convention: Transmittance,
     ray: &CompositeInput,
-    offsets: &[f64],
+    (offsets, gains): (&[f64], &[f64]),
     output: &mut CompositeOutput,
 ) {
     let depth: f64 = output.weights.iter().zip(offsets).map(|(w, offset)| w * offset).sum();
     output.loss += share * depth * depth;
     let color: Vec<_> = offsets.iter().map(|&offset| [offset, 0.0, 0.0]).collect();
     let channel = CompositeInput { color: &color, background: [0.0; 3], ..*ray };
-    for (d_s, by_s) in output.d_s.iter_mut().zip(d_rendered_by_s(convention, &channel)) {
+    for (d_s, by_s) in output.d_s.iter_mut().zip(thin(convention, &channel, gains).by_s) {
         *d_s += 2.0 * share * depth * by_s[0];
     }
 }
@@ -108,7 +115,10 @@ mod tests {
     #[test]
     fn plainly_it_is_what_compositing_says() {
         for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
-            assert_eq!(composite_with(Loss::default(), convention, &RAY, &[]), composite(convention, &RAY));
+            assert_eq!(
+                composite_with(Loss::default(), convention, &RAY, &[], &[]),
+                composite(convention, &RAY)
+            );
         }
     }
 
@@ -127,7 +137,7 @@ mod tests {
     fn gradients_are_slopes() {
         let loss = Loss { is_relative: true, depth: 0.7 };
         for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
-            let output = composite_with(loss, convention, &RAY, &OFFSETS);
+            let output = composite_with(loss, convention, &RAY, &OFFSETS, &[]);
             let weights = loss.weights(output.rendered, RAY.target);
             assert!((output.loss - loss_at(loss, weights, convention, &RAY)).abs() < 1e-12);
             for i in 0..3 {
@@ -179,7 +189,7 @@ mod tests {
             background: [1.0; 3],
             rays_in_batch: 1,
         };
-        let of = |s| composite_with(loss, Transmittance::Exclusive, &ray(s), &[0.2]);
+        let of = |s| composite_with(loss, Transmittance::Exclusive, &ray(s), &[0.2], &[]);
         assert!((of(&[10.0]).loss - 2.0 * 0.04).abs() < 1e-12);
         assert!((of(&[-50.0]).loss - 0.25).abs() < 1e-12);
     }

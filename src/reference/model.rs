@@ -47,7 +47,7 @@ pub struct RaySample {
     pub position: DVec3,
     /// Step, in the unit of the density.
     pub delta: f64,
-    /// Factor of the gradient by log-density, 1 unless light samples were dropped.
+    /// How many times its own weight its colour has; 0 where it is left out, see [`super::selection`].
     pub gain: f64,
     /// Distance along the ray, in the unit of its depth.
     pub distance: f64,
@@ -149,11 +149,15 @@ impl Model {
                     rays_in_batch: rays.len() as u32,
                 },
                 &offsets,
+                &collect(&ray.samples, |sample| sample.gain),
             );
             batch.loss += composited.loss;
             batch.rendered.push(composited.rendered);
             for (i, (sample, evaluation)) in ray.samples.iter().zip(&evaluations).enumerate() {
-                let d_s = sample.gain * composited.d_s[i];
+                if sample.gain == 0.0 {
+                    continue;
+                }
+                let d_s = composited.d_s[i];
                 let raw_color = evaluation.raw_color();
                 let d_raw_color: [f64; 3] = std::array::from_fn(|x| {
                     color_backward(objective.color_range, raw_color[x], composited.d_color[i][x])
