@@ -38,6 +38,9 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     gradient_range[2] = 0u;
 
     let asked = f32(counters.rays);
+    let crowding = f32(counters.samples_wanted) / (asked * SAMPLES_PER_RAY);
+    let scale = (1.0 + counters.step_excess) * clamp(crowding, STEP_SHRINKAGE, STEP_GROWTH);
+    counters.step_excess = clamp(scale - 1.0, 0.0, LONGEST_STEP - 1.0);
     let fit_kept = f32(TARGET_KEPT) / max(f32(counters.kept_wanted), 1.0) * (used / asked);
     let fit_samples = f32(TARGET_SAMPLES) / max(f32(counters.samples_wanted), 1.0);
     let factor = clamp(min(fit_kept, fit_samples), 0.5, 1.5);

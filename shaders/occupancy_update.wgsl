@@ -1,5 +1,5 @@
-// Decays the visited cells and raises them to what the network says; see `reference::occupancy`.
-// Cells that can hold nothing have -1 and are not in the list. Needs: step, exp, density.
+// Raises the visited cells to what the network says; see `reference::occupancy`. Cells that can hold nothing have -1
+// and are not in the list. Needs: step, exp, density.
 
 var<storage, read> visible_cells: array<u32>;
 tensor<read> density_out: vec4<f32>;
@@ -14,5 +14,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let cell = visible_cells[step.first_cell + index * step.cell_stride];
     let tau = exp_accurate(density_log(density_out_load(index * DENSITY_QUADS).x)) * STEP_MIN * DENSITY_SCALE;
-    occupancy[cell] = max(occupancy[cell] * OCCUPANCY_DECAY, tau);
+    occupancy[cell] = max(occupancy[cell], tau);
 }

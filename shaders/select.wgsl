@@ -4,7 +4,7 @@
 // ray. A group that stays lighter than LIGHT_SHARE of the floor is kept by chance; what that adds to the ray's weight
 // or takes from it is made up for by the next kept sample. Opacity and transmittance are those of all samples.
 // Nothing is kept behind the point where the ray is opaque; see `reference::selection`.
-// Needs: random, step, counters, exp, density.
+// Needs: random, step, counters, exp, density, refresh.
 
 var<storage, read> counters: Counters;
 tensor<read> samples: vec4<f32>;
@@ -72,7 +72,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var transmittance = 1.0;
     var walk = Walk(span.x, 0.0, 0.0, 0.0, 0u, 0.0, 0.0, 0.0);
     for (var i = span.x; i < span.x + span.y; i++) {
-        let tau = optical_depth(density_log(density_out_load(i * DENSITY_QUADS).x), samples_load(i).w);
+        let sample = samples_load(i);
+        let log_density = density_log(density_out_load(i * DENSITY_QUADS).x);
+        let tau = optical_depth(log_density, sample.w);
+        occupancy_refresh(sample.xyz, log_density);
         let weight = transmittance * opacity(tau);
         if weight >= WEIGHT_FLOOR {
             walk = close(walk);

@@ -53,6 +53,9 @@ pub struct About {
     pub step: u32,
     /// Rays of the next step.
     pub rays: u32,
+    /// By how much the steps along its rays are longer than the configuration's, as a share of them.
+    #[serde(default)]
+    pub step_excess: f32,
     /// Seconds of training; 0 of a deterministic one.
     pub seconds: f64,
     /// When the training is to end.
@@ -200,7 +203,13 @@ impl Checkpoint {
         };
         let buffers = STATE.iter().map(buffer).collect::<Result<_>>()?;
         let occupancy_bits = bytemuck::pod_collect_to_vec(data(BITS, Dtype::U32)?);
-        let state = State { step: about.step, rays: about.rays, buffers, occupancy_bits };
+        let state = State {
+            step: about.step,
+            rays: about.rays,
+            step_excess: about.step_excess,
+            buffers,
+            occupancy_bits,
+        };
         Ok(Self { about, state })
     }
 }
@@ -272,6 +281,7 @@ mod tests {
             adapter: "a test".into(),
             step: 12,
             rays: 345,
+            step_excess: 0.25,
             seconds: 6.75,
             budget: Budget { steps: Some(100), seconds: None },
             config,
@@ -289,7 +299,8 @@ mod tests {
             (0..count).map(|i| i as f32 * 0.25 - 3.0).collect()
         };
         let buffers = STATE.iter().map(values).collect();
-        let state = State { step: 12, rays: 345, buffers, occupancy_bits: vec![0xdead_beef; 128] };
+        let state =
+            State { step: 12, rays: 345, step_excess: 0.25, buffers, occupancy_bits: vec![0xdead_beef; 128] };
         Checkpoint { about, state }
     }
 

@@ -68,6 +68,11 @@ pub struct Network {
 pub struct March {
     /// Smallest steps along the diagonal of the inner cube.
     pub steps: u32,
+    /// Steps are longer than that while rays have more samples than this on average: as long as fog fills the way, many
+    /// rays teach more than many samples.
+    pub samples_per_ray: f64,
+    /// How many times longer at most, and at the start.
+    pub longest_step: f64,
     /// Growth of the step with the distance, in boxes larger than the inner cube.
     pub cone: f64,
     /// Most steps along one ray, a multiple of 32.
@@ -82,16 +87,14 @@ pub struct March {
 pub struct Occupancy {
     /// Cells per axis of each cascade, a multiple of 16 up to 256.
     pub cells: u32,
-    /// Factor on a visited cell's value before the maximum is taken.
+    /// Factor on every cell's value at each update: what rays and visits do not raise again fades.
     pub decay: f64,
-    /// A cell is occupied above this optical depth per smallest step (or the mean, if that is less).
+    /// A cell is occupied above this optical depth per smallest step (or half the mean, if that is less).
     pub threshold: f64,
     /// Steps between updates.
     pub interval: u32,
-    /// Steps during which every update visits all cells.
-    pub warm_up: u32,
-    /// After that, one cell in this many is visited by an update.
-    pub stride: u32,
+    /// Cells that updates visit, as a share of the samples that rays march: rays refresh the cells they go through.
+    pub share: f64,
 }
 
 /// Rays and samples per step.
@@ -223,13 +226,20 @@ impl Default for Network {
 
 impl Default for March {
     fn default() -> Self {
-        Self { steps: 1024, cone: 1.0 / 256.0, most_steps: 1024, near: 0.05 }
+        Self {
+            steps: 1024,
+            samples_per_ray: 128.0,
+            longest_step: 16.0,
+            cone: 1.0 / 256.0,
+            most_steps: 1024,
+            near: 0.05,
+        }
     }
 }
 
 impl Default for Occupancy {
     fn default() -> Self {
-        Self { cells: 128, decay: 0.95, threshold: 0.01, interval: 16, warm_up: 256, stride: 4 }
+        Self { cells: 128, decay: 0.95, threshold: 0.01, interval: 16, share: 0.1 }
     }
 }
 
@@ -344,7 +354,6 @@ impl Config {
         whole("march.most_steps", march.most_steps, 32, 1 << 14, 32)?;
         whole("occupancy.cells", occupancy.cells as usize, 16, 256, 16)?;
         whole("occupancy.interval", occupancy.interval as usize, 1, 1 << 20, 1)?;
-        whole("occupancy.stride", occupancy.stride as usize, 1, 64, 1)?;
         whole("batch.kept", batch.kept, march.most_steps, 1 << 22, 1)?;
         whole("batch.samples", batch.samples, batch.kept.max(march.most_steps), 1 << 24, 1)?;
         whole("batch.rays", batch.rays, 64, 1 << 22, 1)?;
@@ -355,8 +364,11 @@ impl Config {
             }
             Ok(())
         };
+        real("march.samples_per_ray", march.samples_per_ray, 1.0, 1e6)?;
+        real("march.longest_step", march.longest_step, 1.0, 64.0)?;
         real("march.cone", march.cone, 1e-5, 0.1)?;
         real("march.near", march.near, 0.0, 10.0)?;
+        real("occupancy.share", occupancy.share, 0.0, 10.0)?;
         real("occupancy.decay", occupancy.decay, 0.0, 1.0)?;
         real("occupancy.threshold", occupancy.threshold, 0.0, 1e6)?;
         real("selection.weight_floor", selection.weight_floor, 0.0, 1.0)?;

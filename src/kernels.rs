@@ -100,6 +100,10 @@ pub const RELATIVE_FLOOR: f64 = 0.01;
 /// Part of the photo's brightness that a rendered colour is at least taken for in relative errors.
 const RELATIVE_DARKEST: f64 = 1e-3;
 
+/// Least and most change of the length of all steps from one training step to the next.
+const STEP_SHRINKAGE: f64 = 0.99;
+const STEP_GROWTH: f64 = 1.02;
+
 /// llvmpipe ends the loops of a thread after so many rounds together, without an error; ordered sums have one round
 /// per kept sample.
 const LONGEST_LOOP: usize = 65_535;
@@ -201,6 +205,12 @@ impl Plan {
         (self.config.occupancy.cells as usize).pow(3) * self.needs.cascades as usize
     }
 
+    /// Marched samples that a step aims at, so that they usually fit.
+    #[must_use]
+    pub fn target_samples(&self) -> usize {
+        self.config.batch.samples / 8 * 7
+    }
+
     /// Words that hold one bit per step of a ray.
     #[must_use]
     pub fn step_words(&self) -> usize {
@@ -279,7 +289,7 @@ impl Plan {
             ("MAX_STEPS", config.march.most_steps),
             ("STEP_WORDS", self.step_words()),
             ("TARGET_KEPT", config.batch.kept),
-            ("TARGET_SAMPLES", config.batch.samples / 8 * 7),
+            ("TARGET_SAMPLES", self.target_samples()),
             ("LEAST_RAYS", 16),
             ("MOST_RAYS", config.batch.rays),
             ("DISPATCH_RAYS", dispatch::RAYS),
@@ -304,7 +314,10 @@ impl Plan {
             ("STEP_MIN", self.step_min()),
             ("STEP_MAX", 1.0 / f64::from(config.occupancy.cells)),
             ("CONE", config.march.cone),
-            ("LOG_CONE", config.march.cone.ln_1p()),
+            ("SAMPLES_PER_RAY", config.march.samples_per_ray),
+            ("LONGEST_STEP", config.march.longest_step),
+            ("STEP_SHRINKAGE", STEP_SHRINKAGE),
+            ("STEP_GROWTH", STEP_GROWTH),
             ("DENSITY_SCALE", self.density_scale()),
             ("T_NEAR", config.march.near / self.density_scale()),
             ("LIGHT_SHARE", config.selection.light_share.max(1e-6)),

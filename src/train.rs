@@ -26,7 +26,7 @@ pub struct Trainer {
     occupancy: occupancy::Update,
     step: u32,
     visible_cells: u32,
-    /// What every cell of the occupancy grid starts from: 0, or -1 where nothing can be.
+    /// What every cell of the occupancy grid starts from; -1 where nothing can be.
     first_occupancy: Vec<f32>,
 }
 
@@ -56,6 +56,8 @@ pub struct State {
     pub step: u32,
     /// Rays of the next step.
     pub rays: u32,
+    /// By how much its steps along the rays are longer than the configuration's, as a share of them.
+    pub step_excess: f32,
     /// The buffers of [`training::STATE`], in that order.
     pub buffers: Vec<Vec<f32>>,
     /// One bit per occupied cell.
@@ -80,7 +82,9 @@ impl Trainer {
         workspace.add_banks(views.banks);
         let stages = step_stages(gpu, &plan, &workspace)?;
         let occupancy = occupancy::Update::new(gpu, &plan, &workspace)?;
-        let first_occupancy = hidden.iter().map(|&hidden| if hidden { -1.0 } else { 0.0 }).collect();
+        // The networks begin with a log-density of about 0.
+        let initial = (plan.step_min() * plan.density_scale()) as f32;
+        let first_occupancy = hidden.iter().map(|&hidden| if hidden { -1.0 } else { initial }).collect();
         let visible_cells = visible.len() as u32;
         let mut trainer = Self {
             gpu: Arc::clone(gpu),
@@ -102,7 +106,7 @@ impl Trainer {
     /// When the device was lost or a kernel failed.
     pub fn warm_up(&mut self) -> Result<()> {
         self.step(0.0, None)?;
-        self.refresh_occupancy(true, None)?;
+        self.refresh_occupancy(None)?;
         self.gpu.wait()?;
         self.reset()
     }
@@ -126,7 +130,8 @@ impl Trainer {
         let rays = self.plan.config.batch.first_rays;
         let bits = |cells: &[f32]| (0..32).fold(0, |word, bit| word | (u32::from(cells[bit] >= 0.0) << bit));
         let occupancy_bits = self.first_occupancy.chunks_exact(32).map(bits).collect();
-        self.restore(&State { step: 0, rays, buffers, occupancy_bits })
+        let step_excess = (self.plan.config.march.longest_step - 1.0) as f32;
+        self.restore(&State { step: 0, rays, step_excess, buffers, occupancy_bits })
     }
 
     /// Goes on from `state`.
@@ -145,7 +150,8 @@ impl Trainer {
             self.workspace.write(&self.gpu, name, data);
         }
         self.workspace.write(&self.gpu, "occupancy_bits", &state.occupancy_bits);
-        let counters = Counters { rays: state.rays, rays_used: 1, ..Counters::default() };
+        let State { rays, step_excess, .. } = *state;
+        let counters = Counters { rays, rays_used: 1, step_excess, ..Counters::default() };
         self.gpu.write(self.workspace.get("counters"), 0, &[counters]);
         let groups = [[state.rays.div_ceil(64), 1, 1, 0]];
         self.gpu.write(self.workspace.get("dispatch"), kernels::dispatch::RAYS, &groups);
@@ -164,9 +170,11 @@ impl Trainer {
     pub fn state(&self) -> Result<State> {
         let read = |name: &&str| self.workspace.read::<f32>(&self.gpu, name, self.state_length(name));
         let buffers = training::STATE.iter().map(read).collect::<Result<_>>()?;
+        let counters = self.gpu.read::<Counters>(self.workspace.get("counters"), 0, 1)?[0];
         Ok(State {
             step: self.step,
-            rays: self.gpu.read::<Counters>(self.workspace.get("counters"), 0, 1)?[0].rays,
+            rays: counters.rays,
+            step_excess: counters.step_excess,
             buffers,
             occupancy_bits: self.workspace.read(&self.gpu, "occupancy_bits", self.plan.cell_count() / 32)?,
         })
@@ -191,8 +199,7 @@ impl Trainer {
     pub fn step(&mut self, learning_rate: f64, mut timer: Option<&mut Timer>) -> Result<()> {
         let grid = &self.plan.config.occupancy;
         if self.step > 0 && self.step.is_multiple_of(grid.interval) {
-            let all = self.step <= grid.warm_up;
-            self.refresh_occupancy(all, timer.as_deref_mut())?;
+            self.refresh_occupancy(timer.as_deref_mut())?;
         }
         self.step += 1;
         let optimizer = &self.plan.config.optimizer;
@@ -255,10 +262,11 @@ impl Trainer {
         pcg(self.step.wrapping_add(pcg(self.plan.config.seed)))
     }
 
-    /// Visits all cells, or every `stride`-th of them in turn.
-    fn refresh_occupancy(&mut self, all: bool, mut timer: Option<&mut Timer>) -> Result<()> {
+    /// Visits every so many-th cell in turn.
+    fn refresh_occupancy(&mut self, mut timer: Option<&mut Timer>) -> Result<()> {
         let grid = &self.plan.config.occupancy;
-        let stride = if all { 1 } else { grid.stride };
+        let marched = self.plan.target_samples() as f64 * f64::from(grid.interval);
+        let stride = (f64::from(self.visible_cells) / (grid.share * marched).max(1.0)).ceil().max(1.0) as u32;
         let first = (self.step / grid.interval) % stride;
         let cells = self.visible_cells.saturating_sub(first).div_ceil(stride);
         let most = self.plan.config.batch.samples as u32;

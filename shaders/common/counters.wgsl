@@ -11,6 +11,9 @@ struct Counters {
     // Samples kept for colour and backward, and the number all used rays asked for.
     kept: u32,
     kept_wanted: u32,
+    // By how much steps are longer than those of the configuration, as a share of them; the last kernel of the step
+    // writes the next one.
+    step_excess: f32,
     // Sums since the host last cleared them.
     sum_steps: u32,
     sum_rays: u32,

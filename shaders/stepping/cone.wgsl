@@ -1,33 +1,51 @@
-// Provides: steps that grow with the distance, between STEP_MIN and STEP_MAX; see `reference::march`.
+// Needs: counters. Provides: steps that grow with the distance, between STEP_MIN and STEP_MAX, all of them times the scale;
+// see `reference::march`.
 
 const STEPPING_LINEAR_END = STEP_MIN / CONE;
 const STEPPING_CONE_END = STEP_MAX / CONE;
 
+fn stepping_scale() -> f32 {
+    return 1.0 + counters.step_excess;
+}
+
+// ln(1 + x) for x in [0, 1], by the series of the inverse hyperbolic tangent: WGSL's log is only as good as its argument
+// rounds.
+fn stepping_log(x: f32) -> f32 {
+    let y = x / (2.0 + x);
+    let square = y * y;
+    return 2.0 * y * (1.0 + square * (0.333333333 + square * (0.2 + square * (0.142857143 + square * 0.111111111))));
+}
+
 fn stepping_index(t: f32) -> f32 {
+    let scale = stepping_scale();
     let middle = clamp(t, STEPPING_LINEAR_END, STEPPING_CONE_END);
-    return min(t, STEPPING_LINEAR_END) / STEP_MIN + log(middle / STEPPING_LINEAR_END) / LOG_CONE
-        + max(t - STEPPING_CONE_END, 0.0) / STEP_MAX;
+    return min(t, STEPPING_LINEAR_END) / (scale * STEP_MIN)
+        + log(middle / STEPPING_LINEAR_END) / stepping_log(scale * CONE)
+        + max(t - STEPPING_CONE_END, 0.0) / (scale * STEP_MAX);
 }
 
 fn stepping_distance(u: f32) -> f32 {
-    let linear = 1.0 / CONE;
-    let cone = log(STEP_MAX / STEP_MIN) / LOG_CONE;
+    let scale = stepping_scale();
+    let growth = stepping_log(scale * CONE);
+    let linear = 1.0 / (scale * CONE);
+    let cone = log(STEP_MAX / STEP_MIN) / growth;
     if u <= linear {
-        return u * STEP_MIN;
+        return u * scale * STEP_MIN;
     }
-    return STEPPING_LINEAR_END * exp(min(u - linear, cone) * LOG_CONE) + max(u - linear - cone, 0.0) * STEP_MAX;
+    return STEPPING_LINEAR_END * exp(min(u - linear, cone) * growth) + max(u - linear - cone, 0.0) * scale * STEP_MAX;
 }
 
 // Length of the step that begins at u. Where a step lies within one of the three parts it is not a difference of
 // distances, which would cancel.
 fn stepping_length(u: f32) -> f32 {
-    let linear = 1.0 / CONE;
+    let scale = stepping_scale();
+    let linear = 1.0 / (scale * CONE);
     if u + 1.0 <= linear {
-        return STEP_MIN;
+        return scale * STEP_MIN;
     }
     let t = stepping_distance(u);
-    if u >= linear && t * (1.0 + CONE) <= STEPPING_CONE_END {
-        return t * CONE;
+    if u >= linear && t * (1.0 + scale * CONE) <= STEPPING_CONE_END {
+        return t * scale * CONE;
     }
     return stepping_distance(u + 1.0) - t;
 }

@@ -1,14 +1,14 @@
-// Provides: equal steps of STEP_MIN along the ray; see `reference::march`.
+// Needs: counters. Provides: equal steps along the ray; see `reference::march`.
 
 fn stepping_index(t: f32) -> f32 {
-    return t / STEP_MIN;
+    return t / stepping_length(0.0);
 }
 
 // Length of the step that begins at u; not a difference of distances, which would cancel.
 fn stepping_length(u: f32) -> f32 {
-    return STEP_MIN;
+    return STEP_MIN * (1.0 + counters.step_excess);
 }
 
 fn stepping_distance(u: f32) -> f32 {
-    return u * STEP_MIN;
+    return u * stepping_length(u);
 }

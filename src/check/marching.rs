@@ -152,6 +152,7 @@ pub(super) fn reference(bench: &Workbench) -> March {
     March {
         shape: OccupancyShape { cascades, resolution: config.occupancy.cells },
         steps: config.march.steps,
+        scale: 1.0,
         cone: config.march.cone,
         near: config.march.near / bench.plan.density_scale(),
         max_steps: config.march.most_steps as u32,

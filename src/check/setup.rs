@@ -35,7 +35,14 @@ impl Setup {
         let config = Config {
             grid: Grid { levels: 8, base: 4, finest: 40, log2_table: 9 },
             network: Network { width: 16, color_layers: 1 },
-            march: March { steps: 64, cone: 1.0 / 32.0, most_steps: 96, near: 0.05 },
+            march: March {
+                steps: 64,
+                cone: 1.0 / 32.0,
+                most_steps: 96,
+                near: 0.05,
+                longest_step: 1.0,
+                ..March::default()
+            },
             occupancy: Occupancy { cells: 16, ..Occupancy::default() },
             batch: Batch { kept: 256, samples: 512, rays: 256, first_rays: 64 },
             selection: Selection { weight_floor: 0.0, light_share: 1.0, stop_transmittance: 0.0 },

@@ -2,7 +2,9 @@
 
 use super::density::{forward, layer_stage};
 use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
-use super::{COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, Plan, RANDOM, STEP, Workspace, dispatch};
+use super::{
+    COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, OCCUPANCY, Plan, RANDOM, STEP, Workspace, dispatch,
+};
 use crate::config::Transmittance;
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
@@ -50,10 +52,14 @@ pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selectio
         // Whatever is lighter does not show in 32 bits.
         Selection::All => 1e-12,
     };
+    let refresh = match selection {
+        Selection::Training => part!("refresh/marched.wgsl"),
+        Selection::All => part!("refresh/none.wgsl"),
+    };
     let select = plan.generated_kernel(
         gpu,
         "select",
-        &[RANDOM, STEP, COUNTERS, EXP, DENSITY, part!("select.wgsl")],
+        &[RANDOM, STEP, COUNTERS, EXP, DENSITY, OCCUPANCY, refresh, part!("select.wgsl")],
         &[],
         format!("const WEIGHT_FLOOR = f32({floor:?});"),
     )?;

@@ -57,6 +57,8 @@ gpu_struct! {
         kept: u32,
         /// Kept samples all rays asked for.
         kept_wanted: u32,
+        /// By how much steps are longer than those of the configuration, as a share of them.
+        step_excess: f32,
         /// Steps since the sums were cleared.
         sum_steps: u32,
         /// Rays since then.

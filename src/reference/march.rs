@@ -31,6 +31,8 @@ pub struct March {
     pub shape: OccupancyShape,
     /// Steps per diagonal of the inner cube.
     pub steps: u32,
+    /// How many times longer all steps are, at least 1: `dt_min`, `dt_max` and `κ` are multiplied by it.
+    pub scale: f64,
     /// `κ`, usually [`CONE`]; without effect for a single cascade, and 0 makes all steps equal.
     pub cone: f64,
     /// Distance from the origin before which nothing is sampled.
@@ -83,14 +85,22 @@ pub fn box_interval(ray: BoxRay, near: f64) -> Option<[f64; 2]> {
 }
 
 impl March {
-    /// Shortest step in box space, `√3/steps · 2^−(C−1)`.
+    /// Shortest step in box space, `scale · √3/steps · 2^−(C−1)`.
     pub fn dt_min(&self) -> f64 {
+        self.scale * self.base_dt_min()
+    }
+
+    fn base_dt_min(&self) -> f64 {
         3.0_f64.sqrt() / f64::from(self.steps.max(1)) * self.shape.side(0)
+    }
+
+    fn growth(&self) -> f64 {
+        self.scale * self.cone
     }
 
     /// Longest step in box space: a cell of the coarsest cascade, `1/R`, but at least the shortest.
     pub fn dt_max(&self) -> f64 {
-        (1.0 / f64::from(self.shape.resolution.max(1))).max(self.dt_min())
+        self.scale * (1.0 / f64::from(self.shape.resolution.max(1))).max(self.base_dt_min())
     }
 
     /// Whether all steps are equal.
@@ -104,12 +114,12 @@ impl March {
         if self.is_uniform() {
             return t / dt_min;
         }
-        let [t1, t2] = [dt_min / self.cone, dt_max / self.cone];
+        let [t1, t2] = [dt_min / self.growth(), dt_max / self.growth()];
         let [u1, u2] = self.bends();
         if t < t1 {
             t / dt_min
         } else if t < t2 {
-            u1 + (t / t1).ln() / self.cone.ln_1p()
+            u1 + (t / t1).ln() / self.growth().ln_1p()
         } else {
             u2 + (t - t2) / dt_max
         }
@@ -121,12 +131,12 @@ impl March {
         if self.is_uniform() {
             return u * dt_min;
         }
-        let [t1, t2] = [dt_min / self.cone, dt_max / self.cone];
+        let [t1, t2] = [dt_min / self.growth(), dt_max / self.growth()];
         let [u1, u2] = self.bends();
         if u < u1 {
             u * dt_min
         } else if u < u2 {
-            t1 * ((u - u1) * self.cone.ln_1p()).exp()
+            t1 * ((u - u1) * self.growth().ln_1p()).exp()
         } else {
             t2 + (u - u2) * dt_max
         }
@@ -134,8 +144,8 @@ impl March {
 
     /// `u(t1)` and `u(t2)`.
     fn bends(&self) -> [f64; 2] {
-        let u1 = 1.0 / self.cone;
-        [u1, u1 + (self.dt_max() / self.dt_min()).ln() / self.cone.ln_1p()]
+        let u1 = 1.0 / self.growth();
+        [u1, u1 + (self.dt_max() / self.dt_min()).ln() / self.growth().ln_1p()]
     }
 
     /// `t_i` and `dt_i` of step `i`, for a ray that enters at `t_near`.
@@ -179,6 +189,7 @@ mod tests {
         March {
             shape: OccupancyShape { cascades, resolution },
             steps,
+            scale: 1.0,
             cone: CONE,
             near: 0.0,
             max_steps: 1024,

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::activation::log_density;
 
-/// What a visited cell usually keeps of its old value.
+/// What a cell usually keeps of its value at an update.
 pub const DECAY: f64 = 0.95;
 /// Value of a cell that no camera sees; it keeps it, and is never occupied.
 pub const UNSEEN: f64 = -1.0;
@@ -59,19 +59,25 @@ impl OccupancyShape {
     }
 }
 
-/// New value of a visited cell, an optical depth: `max(decay old, exp(min(raw, 15)) δ_min)`; an unseen cell stays.
+/// New value of a visited cell, an optical depth: `max(old, exp(min(raw, 15)) δ_min)`; an unseen cell stays. Visits are
+/// those of an update and of every marched sample of a training.
 ///
 /// `raw` is the network's log-density somewhere in the cell. `delta_min` is the shortest step in units of the
-/// inner cube's side, `dt_min 2^(C−1)`. `decay` is usually [`DECAY`].
-pub fn visit(old: f64, raw: f64, delta_min: f64, decay: f64) -> f64 {
-    if old < 0.0 { old } else { (decay * old).max(log_density(raw).exp() * delta_min) }
+/// inner cube's side, `dt_min 2^(C−1)`.
+pub fn visit(old: f64, raw: f64, delta_min: f64) -> f64 {
+    if old < 0.0 { old } else { old.max(log_density(raw).exp() * delta_min) }
 }
 
-/// The value above which a cell counts as occupied: the mean over all cells that are seen, but at most `limit`.
+/// What an update leaves of a cell's value once its bit is known; `decay` is usually [`DECAY`].
+pub fn fade(value: f64, decay: f64) -> f64 {
+    if value > 0.0 { value * decay } else { value }
+}
+
+/// The value above which a cell counts as occupied: half the mean over all cells that are seen, but at most `limit`.
 pub fn threshold(values: &[f64], limit: f64) -> f64 {
     let (sum, seen) = (values.iter().filter(|&&value| value >= 0.0))
         .fold((0.0, 0_usize), |(sum, seen), value| (sum + value, seen + 1));
-    (sum / seen.max(1) as f64).min(limit)
+    (0.5 * sum / seen.max(1) as f64).min(limit)
 }
 
 /// The bits of all cells: set where `value > threshold`.
@@ -122,16 +128,16 @@ mod tests {
 
     #[test]
     fn values_become_bits() {
-        assert_eq!(visit(1.0, -30.0, 0.01, DECAY), 0.95);
-        assert_eq!(visit(1e-3, 0.0, 0.01, DECAY), 0.01);
-        assert!(visit(0.0, 1e30, 0.01, DECAY).is_finite());
-        assert_eq!(visit(UNSEEN, 1e30, 0.01, DECAY), UNSEEN);
+        assert_eq!((visit(1.0, -30.0, 0.01), fade(1.0, DECAY)), (1.0, 0.95));
+        assert_eq!(visit(1e-3, 0.0, 0.01), 0.01);
+        assert!(visit(0.0, 1e30, 0.01).is_finite());
+        assert_eq!((visit(UNSEEN, 1e30, 0.01), fade(UNSEEN, DECAY)), (UNSEEN, UNSEEN));
         let mut values = vec![0.0; 40];
         values[33] = 4.0;
-        assert_eq!(threshold(&values, 1.0), 0.1);
+        assert_eq!(threshold(&values, 1.0), 0.05);
         assert_eq!(threshold(&values, 0.01), 0.01);
         values[..20].fill(UNSEEN);
-        assert_eq!(threshold(&values, 1.0), 0.2);
+        assert_eq!(threshold(&values, 1.0), 0.1);
         assert_eq!(bits(&values, threshold(&[UNSEEN], 1.0)), [0, 2]);
         let words = bits(&values, 0.1);
         assert_eq!(words, [0, 2]);

@@ -175,10 +175,10 @@ impl<'a> Course<'a> {
 
     fn save(&mut self) -> Result<()> {
         let state = self.pace.trainer.state()?;
-        let (step, rays) = (state.step, state.rays);
+        let (step, rays, step_excess) = (state.step, state.rays, state.step_excess);
         // No two runs take the same time; the log has it.
         let seconds = if self.about.config.deterministic { 0.0 } else { self.pace.seconds() };
-        let about = About { step, rays, seconds, ..self.about.clone() };
+        let about = About { step, rays, step_excess, seconds, ..self.about.clone() };
         let checkpoint = Checkpoint { about, state };
         checkpoint.save(&self.checkpoint).with_context(|| format!("at step {step} ({})", self.kept()))?;
         self.saved = (step, self.pace.seconds());

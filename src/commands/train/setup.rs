@@ -161,6 +161,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
         adapter: String::new(),
         step: 0,
         rays: config.batch.first_rays,
+        step_excess: 0.0,
         seconds: 0.0,
         budget: Budget::default(),
         needs,
