@@ -23,6 +23,7 @@ pub mod transforms;
 use std::collections::HashSet;
 use std::path::PathBuf;
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
@@ -35,7 +36,7 @@ pub use photo::Photo;
 pub(crate) use photo::nothing_counts;
 pub use reading::{AlphaMode, Crop, Reading};
 pub use sidecars::DepthEntry;
-pub use splits::{HoldOut, evenly_spaced};
+pub use splits::{HoldOut, evenly_spaced, spread_order};
 
 /// A dataset: what is listed, what was found, and what was assumed.
 #[derive(Clone, Debug)]
@@ -144,6 +145,22 @@ impl Dataset {
             Split::Val => &self.val,
             Split::Test => &self.test,
         }
+    }
+
+    /// Indices of the frames, each image once: splits may share images.
+    pub(crate) fn distinct_images(&self) -> Vec<usize> {
+        let mut seen = HashSet::new();
+        (0..self.frames.len()).filter(|&index| seen.insert(&self.frames[index].path)).collect()
+    }
+
+    /// The scene's focus: the point nearest to the optical axes of all images, in world space. `None` where the axes
+    /// do not cross.
+    #[must_use]
+    pub fn focus(&self) -> Option<DVec3> {
+        let cameras = self.distinct_images().into_iter().map(|index| &self.frames[index].camera);
+        let axes: Vec<_> = cameras.map(focus::Axis::of).collect();
+        let found = (!axes.is_empty()).then(|| focus::find(&axes))?;
+        (found.kind == focus::FocusKind::Crossing).then_some(found.point)
     }
 
     /// Number of different cameras: sizes, intrinsics and lenses, whatever the pose.

@@ -22,7 +22,6 @@ use crate::dataset::Dataset;
 use crate::dataset::focus::{Axis, Focus, find};
 use glam::DVec3;
 use photos::Gallery;
-use std::collections::HashSet;
 
 /// What the cameras of a dataset tell.
 #[derive(Clone, Debug)]
@@ -91,7 +90,7 @@ struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     fn new(dataset: &'a Dataset) -> Self {
-        let views = views(dataset);
+        let views = dataset.distinct_images();
         let axes: Vec<Axis> = views.iter().map(|&index| Axis::of(&dataset.frames[index].camera)).collect();
         let focus = find(&axes);
         Self { dataset, views, axes, focus }
@@ -120,12 +119,6 @@ impl<'a> Scene<'a> {
     fn names(&self, frames: &[usize]) -> String {
         names(self.dataset, frames)
     }
-}
-
-/// Indices of the frames of a dataset, each image once: splits may share images.
-fn views(dataset: &Dataset) -> Vec<usize> {
-    let mut seen = HashSet::new();
-    (0..dataset.frames.len()).filter(|&index| seen.insert(&dataset.frames[index].path)).collect()
 }
 
 /// `a.png, b.png, c.png and 4 more`.

@@ -71,6 +71,7 @@ pub mod check;
 pub mod checkpoint;
 pub mod config;
 pub mod dataset;
+pub mod depths;
 pub mod file;
 pub mod gpu;
 pub mod health;

@@ -3,7 +3,9 @@
 //! Data in, text out: the rows of `log.jsonl` ([`log`]), the scores of the test views and small pictures of some of
 //! them ([`views`], [`pictures`]) become curves, tables and images in one page.
 
+mod colormap;
 mod curves;
+mod distances;
 pub mod log;
 mod page;
 pub mod pictures;
@@ -13,7 +15,7 @@ pub mod views;
 use anyhow::Result;
 use log::Log;
 use std::time::SystemTime;
-use views::TestViews;
+use views::{Outcome, TestViews};
 
 /// The page's name in the folder of a training.
 pub const FILE: &str = "report.html";
@@ -63,17 +65,22 @@ impl Report {
         page::page(self)
     }
 
-    /// PSNR in decibels, SSIM and number of all test views, of the field as it was left: as measured for this page,
-    /// else as logged at its last step.
+    /// What the test views say of the field as it was left: as measured for this page, else as logged at its last
+    /// step.
     #[must_use]
-    pub fn result(&self) -> Option<(f64, f64, u64)> {
-        let measured = self.views.as_ref().ok();
-        let measured = measured.and_then(|views| Some((views.means()?, views.count() as u64)));
+    pub fn outcome(&self) -> Option<Outcome> {
+        let measured = self.views.as_ref().ok().and_then(TestViews::outcome);
         let logged = || {
             let row = self.log.result().filter(|row| self.steps().is_none_or(|steps| steps == row.step))?;
-            Some((row.eval_psnr?, row.eval_ssim?, row.views))
+            Some(Outcome {
+                psnr: row.eval_psnr?,
+                ssim: row.eval_ssim?,
+                views: row.views,
+                left_out: row.views_left_out,
+                near_share: row.near_share,
+            })
         };
-        measured.map(|([psnr, ssim], count)| (psnr, ssim, count)).or_else(logged)
+        measured.or_else(logged)
     }
 
     /// Steps taken.

@@ -1,7 +1,7 @@
 //! `nerf eval`: PSNR and SSIM against photos.
 
 use super::field::Field;
-use super::scores::{Compared, Judge, Means, Score};
+use super::scores::{Compared, Judge, Means, Score, describe_near, warn_of_fog};
 use super::{Session, find_frames, open_to_compare, writable_folder};
 use crate::cli::Eval;
 use anyhow::{Context, Result, ensure};
@@ -28,14 +28,11 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     }
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
-    let judge = Judge {
-        renderer: field.renderer(&gpu, &lenses)?,
-        color_space: field.color_space(),
-        background: args.background.color(),
-        dataset: &dataset,
-    };
+    let mut judge = Judge::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);
+    judge.background = args.background.color();
     let scores = measure(judge, &indices, args, session)?;
     let means = Means::of(&scores).context("there was nothing to measure")?;
+    warn_of_fog(means.near_share, session.remarks);
     session.print(&report(args, &field, &scores, means), &describe(args, &scores, means, field.color_space()))
 }
 
@@ -46,7 +43,7 @@ fn measure(
     session: &Session<'_>,
 ) -> Result<Vec<Score>> {
     let mut scores = Vec::with_capacity(indices.len());
-    judge.each(indices, session.remarks, |compared| {
+    judge.each(indices, None, session.remarks, |_, compared| {
         let Compared { mut score, size: [width, height], rendered, .. } = compared;
         if let Some(folder) = &args.save {
             let file = format!("{:04}.png", scores.len());
@@ -98,6 +95,7 @@ fn report(args: &Eval, field: &Field, scores: &[Score], means: Means) -> Value {
     json!({
         "psnr": means.psnr,
         "ssim": means.ssim,
+        "near_share": means.near_share,
         "background": args.background.name(),
         "split": format!("{:?}", args.split).to_lowercase(),
         "encoding": "sRGB, clamped to 0..1",
@@ -114,11 +112,12 @@ fn describe(args: &Eval, scores: &[Score], means: Means, color_space: ColorSpace
         .collect();
     let encoding = if color_space == ColorSpace::Linear { ", sRGB-encoded and clamped" } else { "" };
     lines.push(format!(
-        "mean of {} over {}{encoding}: {:.3} dB  SSIM {:.4}",
+        "mean of {} over {}{encoding}: {:.3} dB  SSIM {:.4}, {}",
         count(means.views, &format!("{} view", args.split.split().name())),
         args.background.name(),
         means.psnr,
-        means.ssim
+        means.ssim,
+        describe_near(means.near_share)
     ));
     lines.join("\n")
 }

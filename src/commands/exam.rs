@@ -46,7 +46,7 @@ impl<'a> Exam<'a> {
         let needs = &setup.about.needs;
         let renderer = Renderer::new(gpu, &setup.plan, workspace, &setup.about.bounds, &needs.lenses)?;
         let color_space = ColorSpace::of(needs.hdr);
-        let judge = Judge { renderer, color_space, background: [0.0; 3], dataset };
+        let judge = Judge::new(renderer, color_space, dataset);
         let few = evenly_spaced(&setup.test, few);
         let mut photos = Vec::with_capacity(few.len());
         dataset.stream(&few, false, &mut |position, photo| {
@@ -71,7 +71,7 @@ impl<'a> Exam<'a> {
     /// Measures all.
     pub(super) fn all(&mut self, remarks: Remarks) -> Result<Option<Marks>> {
         let mut scores = Vec::with_capacity(self.test.len());
-        self.judge.each(&self.test, remarks, |compared| {
+        self.judge.each(&self.test, None, remarks, |_, compared| {
             scores.push(compared.score);
             Ok(())
         })?;

@@ -1,20 +1,20 @@
 //! `nerf report`: the page about a training, written by `nerf train` too.
 
 use super::field::Field;
-use super::scores::Judge;
+use super::scores::{Compared, Judge, describe_near, warn_of_fog};
 use super::{Session, find_frames, open_to_compare};
 use crate::cli::Report as Args;
 use crate::remarks::Remarks;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
 use nerf::checkpoint::{self, About};
-use nerf::dataset::Dataset;
+use nerf::dataset::{Dataset, spread_order};
 use nerf::file::write_atomically;
 use nerf::report::log::Log;
 use nerf::report::pictures::{Pair, Pictures};
-use nerf::report::views::TestViews;
+use nerf::report::views::{Outcome, TestViews};
 use nerf::report::{FILE, Facts, Report};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -48,23 +48,37 @@ pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
     let report = Report { facts, log, views };
     save(&report, &out)?;
     let page = out.display().to_string();
-    let text = match report.result() {
-        Some((psnr, ssim, count)) => {
-            format!("PSNR {psnr:.3} dB, SSIM {ssim:.4} over {count} test views; {page}")
-        }
-        None => page.clone(),
-    };
-    let result = json!({
+    let outcome = report.outcome();
+    let text = outcome.map_or_else(|| page.clone(), |outcome| format!("{}; {page}", describe(&outcome)));
+    let mut result = json!({
         "report": page,
-        "views": report.views.as_ref().map_or(0, TestViews::count),
-        "psnr": report.result().map(|(psnr, ..)| psnr),
-        "ssim": report.result().map(|(_, ssim, _)| ssim),
         "steps": report.steps(),
         "seconds": report.seconds(),
         "skipped": report.log.skipped(),
         "without_views": report.views.as_ref().err(),
     });
+    add_outcome(&mut result, outcome.as_ref());
+    // What the log tells of them is no part of the page's pictures.
+    result["views"] = json!(report.views.as_ref().map_or(0, TestViews::count));
+    warn_of_fog(outcome.and_then(|outcome| outcome.near_share), session.remarks);
     session.print(&result, &text)
+}
+
+/// What the test views say, in words.
+pub(super) fn describe(outcome: &Outcome) -> String {
+    let Outcome { psnr, ssim, near_share, .. } = *outcome;
+    let (measured, near) = (outcome.measured(), describe_near(near_share));
+    format!("PSNR {psnr:.3} dB, SSIM {ssim:.4} over {measured} on black, {near}")
+}
+
+/// What the test views say, as entries of a result; null where nothing was measured.
+pub(super) fn add_outcome(result: &mut Value, outcome: Option<&Outcome>) {
+    result["psnr"] = json!(outcome.map(|outcome| outcome.psnr));
+    result["ssim"] = json!(outcome.map(|outcome| outcome.ssim));
+    result["near_share"] = json!(outcome.and_then(|outcome| outcome.near_share));
+    result["background"] = json!(outcome.map(|_| "black"));
+    result["views"] = json!(outcome.map_or(0, |outcome| outcome.views));
+    result["views_left_out"] = json!(outcome.map_or(0, |outcome| outcome.left_out));
 }
 
 /// Writes the page of a training that has just ended; where it is.
@@ -76,14 +90,23 @@ pub(super) fn after_training(run: &Path, about: &About, views: Result<TestViews,
     Ok(out)
 }
 
-/// Renders and scores frames, and keeps pictures of a few.
-pub(super) fn measure(judge: &mut Judge<'_>, indices: &[usize], remarks: Remarks) -> Result<TestViews> {
-    let mut views = TestViews::new(indices.len());
-    judge.each(indices, remarks, |compared| {
-        let (score, size) = (&compared.score, compared.size);
-        let pair = Pair { size, rendered: &compared.rendered, photo: &compared.photo };
-        views.add(&score.file, [score.psnr, score.ssim], || Pictures::new(&pair))
+/// Renders and scores frames, and keeps pictures of a few. It takes about `limit` seconds at most: what it comes to
+/// by then is evenly spaced.
+pub(super) fn measure(
+    judge: &mut Judge<'_>,
+    indices: &[usize],
+    limit: Option<f64>,
+    remarks: Remarks,
+) -> Result<TestViews> {
+    let mut views = TestViews::default();
+    let order = spread_order(indices.len());
+    let spread: Vec<usize> = order.iter().map(|&position| indices[position]).collect();
+    let reached = judge.each(&spread, limit, remarks, |number, compared| {
+        let Compared { score, size, rendered, photo, depth, unit } = &compared;
+        let pair = Pair { size: *size, rendered, photo, depth, unit: *unit };
+        views.add(order[number], score.for_page(), || Pictures::new(&pair))
     })?;
+    views.left_out = indices.len() - reached;
     Ok(views)
 }
 
@@ -137,13 +160,8 @@ fn views(args: &Args, field: &Field, session: &Session<'_>) -> Result<Result<Tes
     };
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
-    let mut judge = Judge {
-        renderer: field.renderer(&gpu, &lenses)?,
-        color_space: field.color_space(),
-        background: [0.0; 3],
-        dataset: &dataset,
-    };
-    let mut views = measure(&mut judge, &indices, session.remarks)?;
+    let mut judge = Judge::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);
+    let mut views = measure(&mut judge, &indices, None, session.remarks)?;
     views.missing = missing;
     Ok(Ok(views))
 }

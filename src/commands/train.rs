@@ -10,6 +10,7 @@ pub(super) mod setup;
 pub(super) mod stages;
 
 use super::exam::Exam;
+use super::scores::warn_of_fog;
 use super::{Session, report, writable_folder};
 use crate::cli::Train;
 use crate::progress::duration;
@@ -23,12 +24,14 @@ use nerf::report::views::TestViews;
 use nerf::schedule::Budget;
 use nerf::train::Trainer;
 use pace::Pace;
-use serde_json::{Value, json};
+use serde_json::json;
 use setup::{Setup, Wishes};
 use std::time::Instant;
 
 /// Views that `--eval-every` looks at.
 const FEW_VIEWS: usize = 4;
+/// Measuring the test views at the end takes at most this part of the training's seconds, unless all are asked for.
+const EVALUATION_SHARE: f64 = 0.1;
 
 pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let mut folder = RunFolder::inspect(args)?;
@@ -87,7 +90,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     finish(args, course, &end, &setup, session)
 }
 
-/// Measures all test views, unless the training was interrupted, writes the report and prints the result.
+/// Measures the test views, unless the training was interrupted, writes the report and prints the result.
 fn finish(
     args: &Train,
     mut course: Course<'_>,
@@ -106,13 +109,13 @@ fn finish(
     });
     let mut text = summary(end, setup, &folder);
     let views = evaluate(args, &mut course, end, setup, session)?;
-    if let Ok(Some([psnr, ssim])) = views.as_ref().map(TestViews::means) {
-        let views = views.as_ref().map_or(0, TestViews::count);
-        result["psnr"] = json!(psnr);
-        result["ssim"] = json!(ssim);
-        result["background"] = Value::from("black");
-        result["views"] = json!(views);
-        text = format!("PSNR {psnr:.3} dB, SSIM {ssim:.4} over {views} test views on black; {text}");
+    if let Some(outcome) = views.as_ref().ok().and_then(TestViews::outcome) {
+        report::add_outcome(&mut result, Some(&outcome));
+        text = format!("{}; {text}", report::describe(&outcome));
+        if outcome.left_out > 0 {
+            text += &format!("; `nerf eval {folder} {}` measures all test views", args.dataset.display());
+        }
+        warn_of_fog(outcome.near_share, session.remarks);
     }
     let about = About { step: end.step, seconds: end.seconds, ..setup.about.clone() };
     match report::after_training(&args.out, &about, views) {
@@ -146,7 +149,7 @@ fn summary(end: &End, setup: &Setup, folder: &str) -> String {
     text
 }
 
-/// The scores of all test views, logged, or why there are none.
+/// The scores of the test views, logged, or why there are none.
 fn evaluate(
     args: &Train,
     course: &mut Course<'_>,
@@ -164,15 +167,20 @@ fn evaluate(
         }));
     };
     let clock = Instant::now();
-    let views = report::measure(&mut exam.judge, &exam.test, session.remarks)?;
-    if let Some([psnr, ssim]) = views.means() {
+    // What is to be the same again must not depend on the clock.
+    let is_limited = !args.eval_all && !setup.about.config.deterministic;
+    let limit = is_limited.then_some(EVALUATION_SHARE * end.seconds);
+    let views = report::measure(&mut exam.judge, &exam.test, limit, session.remarks)?;
+    if let Some(outcome) = views.outcome() {
         course.log.write(&json!({
             "step": end.step,
             "seconds": end.seconds,
-            "eval_psnr": psnr,
-            "eval_ssim": ssim,
+            "eval_psnr": outcome.psnr,
+            "eval_ssim": outcome.ssim,
             "eval_seconds": clock.elapsed().as_secs_f64(),
-            "views": views.count(),
+            "views": outcome.views,
+            "views_left_out": outcome.left_out,
+            "near_share": outcome.near_share,
         }))?;
     }
     Ok(Ok(views))

@@ -28,6 +28,19 @@ pub fn evenly_spaced<T: Copy>(items: &[T], most: usize) -> Vec<T> {
     (0..count).map(|i| items[i * items.len() / count]).collect()
 }
 
+/// The numbers below `count` in an order of which every beginning is roughly evenly spaced: van der Corput's sequence
+/// in base 2. The first `2^k` are those that [`evenly_spaced`] takes.
+#[must_use]
+pub fn spread_order(count: usize) -> Vec<usize> {
+    let parts = count.next_power_of_two().max(2);
+    let unused_bits = usize::BITS - parts.trailing_zeros();
+    let mut is_taken = vec![false; count];
+    let places = (0..parts).map(|number| (number.reverse_bits() >> unused_bits) * count / parts);
+    places
+        .filter(|&place| is_taken.get_mut(place).is_some_and(|taken| !std::mem::replace(taken, true)))
+        .collect()
+}
+
 /// Indices of frames per split.
 #[derive(Debug, Default)]
 pub(super) struct Splits {
@@ -132,6 +145,31 @@ mod tests {
         assert_eq!((single.train, single.test.len(), notes), (vec![0], 0, 1));
         let listed: Vec<_> = names.iter().map(|name| (TRAIN, name.as_str())).collect();
         assert_eq!(split(&listed, HoldOut::Every(10)).0.test, [0, 10]);
+    }
+
+    #[test]
+    fn every_beginning_of_a_spread_order_is_spaced() {
+        assert_eq!(spread_order(6), [0, 3, 1, 4, 2, 5]);
+        for count in 0..70 {
+            let order = spread_order(count);
+            let sorted = |numbers: &[usize]| {
+                let mut numbers = numbers.to_vec();
+                numbers.sort_unstable();
+                numbers
+            };
+            let all: Vec<usize> = (0..count).collect();
+            assert_eq!(sorted(&order), all);
+            for first in 1..=count {
+                let places = sorted(&order[..first]);
+                let ends = places.iter().skip(1).chain([&count]);
+                let widest = places.iter().zip(ends).map(|(a, b)| b - a).max().expect("not empty");
+                let even = count.div_ceil(first);
+                assert!(widest <= 2 * even, "{widest} among the first {first} of {count}");
+                if first.is_power_of_two() {
+                    assert_eq!(places, evenly_spaced(&all, first));
+                }
+            }
+        }
     }
 
     #[test]

@@ -4,10 +4,12 @@ use super::log::{Interval, Log, Steps};
 use crate::chart::{Axis, Chart, Mark, Series};
 
 const TIME: &str = "seconds of training";
+const KEPT: &str = "kept: with colour and gradients";
 
 /// The charts that the log has data for.
 pub(super) fn charts(log: &Log) -> Vec<Chart> {
-    let all = [quality(log), loss(log), speed(log), rays(log), samples(log), learning_rate(log)];
+    let all =
+        [quality(log), loss(log), speed(log), rays(log), samples(log), per_ray(log), learning_rate(log)];
     all.into_iter().filter(|chart| chart.series.iter().any(|series| !series.points.is_empty())).collect()
 }
 
@@ -42,10 +44,20 @@ fn rays(log: &Log) -> Chart {
 
 fn samples(log: &Log) -> Chart {
     let marched = of_intervals(log, "marched", |interval| Some(interval.row.marched? / interval.steps));
-    let used = of_intervals(log, "with colour and gradients", |interval| {
-        Some(interval.row.samples? / interval.steps)
-    });
-    chart("Samples per step", Axis::log("samples per step"), vec![marched, used])
+    let kept = of_intervals(log, KEPT, |interval| Some(interval.row.samples? / interval.steps));
+    chart("Samples per step", Axis::log("samples per step"), vec![marched, kept])
+}
+
+/// Samples of a ray: many marched ones tell of space that is not known to be empty, many kept ones of a field that
+/// is not solid.
+fn per_ray(log: &Log) -> Chart {
+    let per_ray = |samples: Option<f64>, row: &Steps| Some(samples? / row.rays.filter(|rays| *rays > 0.0)?);
+    let of = |name, samples: fn(&Steps) -> Option<f64>| {
+        let points = log.steps.iter().filter_map(|row| Some((row.seconds?, per_ray(samples(row), row)?)));
+        Series::new(name, Mark::Line, points.collect())
+    };
+    let series = vec![of("marched", |row| row.marched), of(KEPT, |row| row.samples)];
+    chart("Samples per ray", Axis::log("samples per ray"), series)
 }
 
 fn learning_rate(log: &Log) -> Chart {

@@ -79,6 +79,10 @@ pub struct Evaluation {
     pub eval_seconds: Option<f64>,
     /// Number of views.
     pub views: u64,
+    /// Number of test views that were not measured at the end, because it would have taken too long.
+    pub views_left_out: u64,
+    /// Part of the pixels with a surface right before the camera.
+    pub near_share: Option<f64>,
 }
 
 /// Where the time of a step goes.
@@ -180,7 +184,7 @@ impl Log {
         (seconds > 0.0).then(|| samples / seconds)
     }
 
-    /// The last evaluation of all test views: one with SSIM.
+    /// The last evaluation at the end of a training: one with SSIM.
     #[must_use]
     pub fn result(&self) -> Option<&Evaluation> {
         self.evaluations.iter().rev().find(|row| row.eval_ssim.is_some())

@@ -1,18 +1,20 @@
 //! The page as HTML. What comes from files is escaped by `maud`.
 
+use super::colormap::{INFERNO, gradient};
 use super::log::Start;
-use super::pictures::{ERROR_SCALE, HEAT, LONGEST_SIDE};
+use super::pictures::{ERROR_SCALE, LONGEST_SIDE};
 use super::views::{EVENLY_SPACED, Row, TestViews, WORST};
-use super::{Report, curves, time};
-use crate::words::{duration, short};
+use super::{Report, curves, distances, time};
+use crate::depths::{Depths, fog};
+use crate::words::{duration, length, percent, short};
 use anyhow::Result;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::path::Path;
 
 const STYLE: &str = include_str!("style.css");
 /// Size of a chart, in pixels; the page scales it.
-const CHART: [u32; 2] = [440, 280];
-/// TestViews that the table of scores shows unfolded.
+pub(super) const CHART: [u32; 2] = [440, 280];
+/// Views that the table of scores shows unfolded.
 const UNFOLDED: usize = 12;
 /// Pictures narrower than this are enlarged with sharp pixels.
 const SMALL: u32 = 160;
@@ -21,6 +23,7 @@ const SMALL: u32 = 160;
 pub(super) fn page(report: &Report) -> Result<String> {
     let name = name(report);
     let charts = charts(report)?;
+    let test_views = test_views(report)?;
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -37,7 +40,7 @@ pub(super) fn page(report: &Report) -> Result<String> {
                     (warnings(report))
                     (figures(report))
                     (charts)
-                    (test_views(report))
+                    (test_views)
                     (time::section(&report.log))
                     (setting(report))
                 }
@@ -83,6 +86,7 @@ fn latest<'a, T>(report: &'a Report, value: impl Fn(&'a Start) -> Option<T>) -> 
 /// What a reader must know before the numbers.
 fn warnings(report: &Report) -> Markup {
     let (skipped, damaged) = (report.log.skipped(), report.log.damaged);
+    let fog = report.outcome().and_then(|outcome| fog(outcome.near_share?));
     html! {
         @if skipped > 0 {
             p.warning {
@@ -91,6 +95,7 @@ fn warnings(report: &Report) -> Markup {
                 code { "optimizer.learning_rate" } "."
             }
         }
+        @if let Some(fog) = fog { p.warning { strong { "Fog: " } (fog) "." } }
         @if report.facts.is_done == Some(false) {
             p.warning {
                 strong { "The training was interrupted before its end. " }
@@ -113,10 +118,13 @@ fn warnings(report: &Report) -> Markup {
 fn figures(report: &Report) -> Markup {
     let log = &report.log;
     let mut figures: Vec<(String, String)> = Vec::new();
-    if let Some((psnr, ssim, views)) = report.result() {
-        let of = format!("{views}{}", plural(views, " test view", " test views"));
-        figures.push((format!("{psnr:.2} dB"), format!("PSNR of {of}")));
-        figures.push((format!("{ssim:.4}"), format!("SSIM of {of}")));
+    if let Some(outcome) = report.outcome() {
+        let of = outcome.measured();
+        figures.push((format!("{:.2} dB", outcome.psnr), format!("PSNR of {of}")));
+        figures.push((format!("{:.4}", outcome.ssim), format!("SSIM of {of}")));
+        let near =
+            outcome.near_share.map(|share| (percent(share), "of pixels near: a sign of fog".to_owned()));
+        figures.extend(near);
     } else if let Some(psnr) = log.steps.iter().rev().find_map(|row| row.psnr) {
         figures.push((format!("{psnr:.2} dB"), "PSNR of the rays trained on".to_owned()));
     }
@@ -147,23 +155,26 @@ fn charts(report: &Report) -> Result<Markup> {
     })
 }
 
-fn test_views(report: &Report) -> Markup {
-    html! {
+fn test_views(report: &Report) -> Result<Markup> {
+    Ok(html! {
         section {
             h2 { "Test views" }
             @match &report.views {
                 Err(reason) => { p.remark { (reason) } }
                 Ok(views) if views.count() == 0 => { p.remark { "There are no test views." } }
-                Ok(views) => { (gallery(views, report.facts.hdr)) (scores(views)) }
+                Ok(views) => {
+                    (gallery(views, report.facts.hdr))
+                    (distances::section(views)?)
+                    (scores(views))
+                }
             }
         }
-    }
+    })
 }
 
 fn gallery(views: &TestViews, hdr: bool) -> Markup {
     let rows = views.worst_first();
     let shown: Vec<&Row> = rows.into_iter().filter(|row| row.pictures.is_some()).collect();
-    let colors = HEAT.map(|[r, g, b]| format!("#{r:02x}{g:02x}{b:02x}")).join(", ");
     html! {
         p.remark {
             (views.count()) (plural(views.count() as u64, " view", " views")) " on black, never trained on. "
@@ -172,6 +183,11 @@ fn gallery(views: &TestViews, hdr: bool) -> Markup {
             } @else { "They are shown " }
             "worst first, at most " (LONGEST_SIDE) " pixels wide and high; the scores are of the full size. Select one to enlarge it."
             @if hdr { " Linear light is clamped to 0…1 and sRGB-encoded, for the pictures and for the scores." }
+            @if views.left_out > 0 {
+                " " (views.left_out) (plural(views.left_out as u64, " more was", " more were"))
+                " left out, because measuring takes at most a tenth of the training's time; "
+                code { "nerf eval RUN DATASET" } " measures all, and " code { "nerf report RUN" } " shows them."
+            }
             @if !views.missing.is_empty() {
                 " " (views.missing.len()) (plural(views.missing.len() as u64, " view is", " views are"))
                 " missing in this dataset: " (views.missing[0]) @if views.missing.len() > 1 { ", …" }
@@ -179,9 +195,10 @@ fn gallery(views: &TestViews, hdr: bool) -> Markup {
         }
         p.scale {
             "Absolute error, mean of red, green and blue, of colours from 0 to 1: "
-            span.bar { "0 " i style=(format!("background: linear-gradient(to right, {colors})")) {}
+            span.bar { "0 " i style=(format!("background: {}", gradient(&INFERNO))) {}
                 " " (ERROR_SCALE) " and more" }
         }
+        (distances::scale(views))
         div.views { @for (number, row) in shown.into_iter().enumerate() { (card(number, row)) } }
     }
 }
@@ -191,15 +208,22 @@ fn card(number: usize, row: &Row) -> Markup {
     html! {
         @if let Some(pictures) = &row.pictures {
             @let [width, height] = pictures.size;
-            @let pictures = [("rendering", &pictures.rendered), ("photo", &pictures.photo), ("error", &pictures.error)];
+            @let score = format!("{:.2} dB · SSIM {:.4}", row.scores.psnr, row.scores.ssim);
+            @let depth = format!("depth, 1 = {}", length(pictures.unit));
+            @let pictures = [
+                ("rendering", &pictures.rendered, "rendering"),
+                ("photo", &pictures.photo, "photo"),
+                ("error", &pictures.error, "error"),
+                ("depth", &pictures.depth, &depth),
+            ];
             article id=(id) {
-                h3 { span.name { (row.name) } span.score { (format!("{:.2} dB · SSIM {:.4}", row.psnr, row.ssim)) } }
-                a.trio href=(format!("#{id}")) {
-                    @for (what, address) in pictures {
+                h3 { span.name { (row.scores.name) } span.score { (score) } }
+                a.pictures href=(format!("#{id}")) {
+                    @for (what, address, caption) in pictures {
                         figure {
                             img class=[(width < SMALL).then_some("small")] src=(address) width=(width) height=(height)
-                                alt=(format!("{what} of {}", row.name));
-                            figcaption { (what) }
+                                alt=(format!("{what} of {}", row.scores.name));
+                            figcaption { (caption) }
                         }
                     }
                 }
@@ -211,16 +235,19 @@ fn card(number: usize, row: &Row) -> Markup {
 fn scores(views: &TestViews) -> Markup {
     html! {
         details open[views.count() <= UNFOLDED] {
-            summary { "Scores of all " (views.count()) " views, worst first" }
+            summary { "Scores of " (views.count()) (plural(views.count() as u64, " view", " views")) ", worst first" }
             div.wide {
                 table.scores {
-                    thead { tr { th { "view" } th.number { "PSNR, dB" } th.number { "SSIM" } } }
+                    thead { tr { th { "view" } th.number { "PSNR, dB" } th.number { "SSIM" } th.number { "near" } } }
                     tbody {
                         @for row in views.worst_first() {
+                            @let view = &row.scores;
+                            @let near = view.depths.as_ref().and_then(Depths::near_share);
                             tr {
-                                td.name { (row.name) }
-                                td.number { (format!("{:.3}", row.psnr)) }
-                                td.number { (format!("{:.4}", row.ssim)) }
+                                td.name { (view.name) }
+                                td.number { (format!("{:.3}", view.psnr)) }
+                                td.number { (format!("{:.4}", view.ssim)) }
+                                td.number { (near.map_or_else(|| "–".to_owned(), percent)) }
                             }
                         }
                     }

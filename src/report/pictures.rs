@@ -1,5 +1,6 @@
-//! Small pictures of a view, as `data:` addresses: the rendering, the photo, and where they differ.
+//! Small pictures of a view, as `data:` addresses: the rendering and its depth, the photo, and where they differ.
 
+use super::colormap::{INFERNO, VIRIDIS, color};
 use crate::picture::quantised;
 use anyhow::{Context, Result};
 use base64::Engine;
@@ -17,23 +18,9 @@ pub const ERROR_SCALE: f32 = 0.1;
 const LOSSLESS: u32 = 128 * 128;
 const QUALITY: u8 = 88;
 
-/// The colours of errors from 0 to [`ERROR_SCALE`]: the map “inferno” of Smith and van der Walt (2015), equally
-/// bright steps for equal steps of the error.
-pub(super) const HEAT: [[u8; 3]; 9] = [
-    [0x00, 0x00, 0x04],
-    [0x1f, 0x0c, 0x48],
-    [0x55, 0x0f, 0x6d],
-    [0x88, 0x22, 0x6a],
-    [0xba, 0x36, 0x55],
-    [0xe3, 0x59, 0x33],
-    [0xf9, 0x8c, 0x0a],
-    [0xf9, 0xc9, 0x32],
-    [0xfc, 0xff, 0xa4],
-];
-
 type Picture = ImageBuffer<Rgb<f32>, Vec<f32>>;
 
-/// A rendering and its photo: display-referred colours in `[0, 1]`, row by row, `[height * width]`.
+/// A rendering and its photo, row by row, `[height * width]`; colours are display-referred, in `[0, 1]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<'a> {
     /// Width and height in pixels.
@@ -42,10 +29,14 @@ pub struct Pair<'a> {
     pub rendered: &'a [[f32; 3]],
     /// The photo.
     pub photo: &'a [[f32; 3]],
+    /// The rendering's depth in world units, 0 where nothing is.
+    pub depth: &'a [f32],
+    /// The depth that lies in the middle of the scale, in world units.
+    pub unit: f64,
 }
 
-/// Three pictures of one view and one size.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Four pictures of one view and one size.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Pictures {
     /// Width and height in pixels.
     pub size: [u32; 2],
@@ -55,6 +46,11 @@ pub struct Pictures {
     pub photo: String,
     /// The absolute error, mean of the channels, from black for 0 to pale yellow for [`ERROR_SCALE`] and more.
     pub error: String,
+    /// The depth, from yellow for what is near to violet for what is far, linear in `1 / (1 + (depth / unit)³)`; black
+    /// where nothing is.
+    pub depth: String,
+    /// The depth that lies in the middle of the scale, in world units.
+    pub unit: f64,
 }
 
 impl Pictures {
@@ -68,15 +64,33 @@ impl Pictures {
             [sum / 3.0; 3]
         };
         let errors: Vec<_> = pair.rendered.iter().zip(pair.photo).map(differ).collect();
-        let [rendered, photo, error] = [pair.rendered, pair.photo, &errors].map(|p| reduced(p, pair.size));
-        let (rendered, photo, error) = (rendered?, photo?, error?);
+        // Beside its place on the scale, whether there is any: a pixel may cover both something and nothing.
+        let place = |&z: &f32| match z > 0.0 {
+            true => [nearness(f64::from(z) / pair.unit) as f32, 1.0, 0.0],
+            false => [0.0; 3],
+        };
+        let depths: Vec<_> = pair.depth.iter().map(place).collect();
+        let reduced = |pixels| reduced(pixels, pair.size);
+        let (rendered, photo) = (reduced(pair.rendered)?, reduced(pair.photo)?);
+        let (error, depth) = (reduced(&errors)?, reduced(&depths)?);
         Ok(Self {
             size: [error.width(), error.height()],
             rendered: encoded(&rendered, |color| color.map(quantised))?,
             photo: encoded(&photo, |color| color.map(quantised))?,
-            error: encoded(&error, |[error, ..]| heat(error / ERROR_SCALE))?,
+            error: encoded(&error, |[error, ..]| color(&INFERNO, error / ERROR_SCALE))?,
+            depth: encoded(&depth, |[place, covered, _]| match covered < 0.5 {
+                true => [0; 3],
+                false => color(&VIRIDIS, place / covered),
+            })?,
+            unit: pair.unit,
         })
     }
+}
+
+/// The place of a relative depth `d` on the scale of depths: `1 / (1 + d³)`, so that 1 lies in the middle, 0 at its
+/// bright end, and what is endlessly far at its dark one.
+pub(super) fn nearness(relative: f64) -> f64 {
+    1.0 / (1.0 + relative.powi(3))
 }
 
 /// The picture at its own size, or at the largest one allowed; each pixel is the mean of what it covers.
@@ -111,25 +125,14 @@ fn encoded(picture: &Picture, color: impl Fn([f32; 3]) -> [u8; 3]) -> Result<Str
     Ok(format!("data:image/{format};base64,{}", STANDARD.encode(file)))
 }
 
-/// The colour of `part` in `[0, 1]` of the scale; what is not a number is as bad as can be.
-fn heat(part: f32) -> [u8; 3] {
-    let part = if part.is_nan() { 1.0 } else { part.clamp(0.0, 1.0) };
-    let place = part * (HEAT.len() - 1) as f32;
-    let below = (place as usize).min(HEAT.len() - 2);
-    let (a, b, t) = (HEAT[below], HEAT[below + 1], place - below as f32);
-    std::array::from_fn(|i| (f32::from(a[i]) * (1.0 - t) + f32::from(b[i]) * t + 0.5) as u8)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn errors_go_from_black_to_pale_yellow() {
-        assert_eq!((heat(0.0), heat(1.0), heat(9.0), heat(-1.0)), (HEAT[0], HEAT[8], HEAT[8], HEAT[0]));
-        assert_eq!((heat(0.5), heat(f32::NAN)), (HEAT[4], HEAT[8]));
-        let between = heat(1.0 / 16.0);
-        assert_eq!(between, [0x10, 0x06, 0x26]);
+    fn near_depths_are_bright() {
+        let places = [0.0, 0.5, 1.0, 2.0, f64::INFINITY].map(nearness);
+        assert_eq!(places, [1.0, 8.0 / 9.0, 0.5, 1.0 / 9.0, 0.0]);
     }
 
     #[test]

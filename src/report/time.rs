@@ -73,9 +73,10 @@ fn once(log: &Log) -> Vec<(String, f64)> {
     }
     let (while_training, final_ones): (Vec<_>, Vec<_>) =
         log.evaluations.iter().partition(|row| row.eval_ssim.is_none());
-    for (what, rows) in
-        [("evaluating while training", while_training), ("evaluating all test views", final_ones)]
-    {
+    for (what, rows) in [
+        ("measuring test views while training", while_training),
+        ("measuring test views at the end", final_ones),
+    ] {
         let seconds: Vec<f64> = rows.iter().filter_map(|row| row.eval_seconds).collect();
         if !seconds.is_empty() {
             once.push((what.to_owned(), seconds.iter().sum()));

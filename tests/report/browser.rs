@@ -91,7 +91,7 @@ fn a_browser_shows_every_picture_and_nothing_overflows() {
     for width in ["phone", "desktop"] {
         assert_eq!(found[width]["images"], pictures, "{found}");
         assert_eq!(found[width]["decoded"], pictures, "{found}");
-        assert_eq!(found[width]["charts"], 6, "{found}");
+        assert_eq!(found[width]["charts"], 8, "{found}");
         assert_eq!(found[width]["overflow"], 0, "{found}");
     }
 }

@@ -3,9 +3,12 @@
 mod browser;
 mod command;
 
+use nerf::dataset::spread_order;
+use nerf::depths::Depths;
+use nerf::render::View;
 use nerf::report::log::Log;
 use nerf::report::pictures::{LONGEST_SIDE, Pair, Pictures};
-use nerf::report::views::TestViews;
+use nerf::report::views::{Outcome, TestViews, ViewScores};
 use nerf::report::{Facts, Report};
 
 /// A log with every kind of row, and a torn last line.
@@ -37,19 +40,38 @@ fn report(log: &str, views: Result<TestViews, String>) -> Report {
 
 /// `count` views of `side`² pixels, each worse than the one before.
 fn views(count: usize, side: u32) -> TestViews {
-    let mut views = TestViews::new(count);
-    for number in 0..count {
+    let mut views = TestViews::default();
+    for number in spread_order(count) {
         let photo: Vec<[f32; 3]> = (0..side * side)
             .map(|i| [(i % side) as f32 / side as f32, (i / side) as f32 / side as f32, 0.5])
             .collect();
         let off = |c: &[f32; 3]| c.map(|value| (value + 0.02 * (40.0 * value).sin()).clamp(0.0, 1.0));
         let rendered: Vec<_> = photo.iter().map(off).collect();
-        let pair = Pair { size: [side, side], rendered: &rendered, photo: &photo };
+        let view = sphere(side);
+        let depths = Some(Depths::of(&view, &[], 2.0));
+        let pair =
+            Pair { size: [side, side], rendered: &rendered, photo: &photo, depth: &view.depth, unit: 2.0 };
         let name = format!("test/<i>{number}.png");
-        let scores = [30.0 - number as f64 / 10.0, 0.9];
-        views.add(&name, scores, || Pictures::new(&pair)).expect("drawn");
+        let scores = ViewScores { name, psnr: 30.0 - number as f64 / 10.0, ssim: 0.9, depths };
+        views.add(number, scores, || Pictures::new(&pair)).expect("drawn");
     }
     views
+}
+
+/// A sphere two units away before nothing, and a tenth of the pixels, rows at the top, half a unit away.
+fn sphere(side: u32) -> View {
+    let depth = |i: u32| {
+        let [x, y] = [i % side, i / side].map(|at| (at as f32 + 0.5) / side as f32 - 0.5);
+        let square = 0.16 - x * x - y * y;
+        match square {
+            _ if 10 * (i / side) < side => 0.5,
+            square if square > 0.0 => 2.0 - square.sqrt(),
+            _ => 0.0,
+        }
+    };
+    let depth: Vec<f32> = (0..side * side).map(depth).collect();
+    let color = depth.iter().map(|&z| if z > 0.0 { [0.5, 0.5, 0.5, 1.0] } else { [0.0; 4] }).collect();
+    View { width: side, height: side, color, depth }
 }
 
 fn page(report: &Report) -> String {
@@ -135,7 +157,7 @@ fn the_page_shows_the_results() {
         "75.0 %",
         "3 timed steps up to step 48",
         "loading images, resuming at step 32",
-        "evaluating all test views",
+        "measuring test views at the end",
         "Trained on",
         "{&quot;&lt;/pre&gt;&lt;script&gt;&quot;: 1}",
         "nerf 0.",
@@ -146,7 +168,16 @@ fn the_page_shows_the_results() {
     assert!(!html.contains("They are shown  ") && !html.contains(">old<"));
     let charts: Vec<_> =
         html.match_indices("aria-label=\"").map(|(at, key)| &html[at + key.len()..]).collect();
-    let titles = ["PSNR", "Loss", "Samples with", "Rays per", "Samples per", "Learning rate"];
+    let titles = [
+        "PSNR",
+        "Loss",
+        "Samples with",
+        "Rays per",
+        "Samples per step",
+        "Samples per ray",
+        "Learning rate",
+        "Opacity",
+    ];
     assert_eq!(charts.len(), titles.len());
     assert!(charts.iter().zip(titles).all(|(chart, title)| chart.starts_with(title)));
     for legend in ["rays trained on", "4 test views", "9 test views"] {
@@ -160,24 +191,28 @@ fn the_worst_views_come_first() {
     let at = |text: &str| html.find(text).expect(text);
     assert!(at("test/&lt;i&gt;2.png") < at("test/&lt;i&gt;1.png"));
     assert!(at("test/&lt;i&gt;1.png") < at("test/&lt;i&gt;0.png"));
-    assert_eq!(html.matches("<img ").count(), 9);
+    assert_eq!(html.matches("<img ").count(), 12);
     assert!(html.contains("alt=\"error of test/&lt;i&gt;2.png\"") && html.contains("0.1 and more"));
 }
 
 #[test]
 fn many_large_views_stay_small() {
     let views = views(50, 500);
-    let names: Vec<_> =
-        views.worst_first().iter().filter(|row| row.pictures.is_some()).map(|row| row.name.clone()).collect();
+    let names: Vec<_> = views
+        .worst_first()
+        .iter()
+        .filter(|row| row.pictures.is_some())
+        .map(|row| row.scores.name.clone())
+        .collect();
     let expected = [49, 48, 47, 46, 43, 37, 31, 25, 18, 12, 6, 0].map(|n| format!("test/<i>{n}.png"));
     assert_eq!(names.len(), 12);
     assert!(names.iter().filter(|name| expected.contains(name)).count() >= 11, "{names:?}");
     assert_eq!(names[..4], expected[..4], "the worst");
     let html = page(&report(FULL, Ok(views)));
     assert!(html.len() < 3_000_000, "{} bytes", html.len());
-    assert_eq!(html.matches(&format!("width=\"{LONGEST_SIDE}\"")).count(), 36);
+    assert_eq!(html.matches(&format!("width=\"{LONGEST_SIDE}\"")).count(), 48);
     assert!(html.contains("Shown are 12: the 4 worst and 8 evenly spaced ones"));
-    assert!(html.contains("<details><summary>Scores of all 50 views"), "folded");
+    assert!(html.contains("<details><summary>Scores of 50 views"), "folded");
 }
 
 #[test]
@@ -204,15 +239,16 @@ fn every_odd_log_gives_a_page() {
     }
     let nothing = Report { facts: Facts::default(), log: Log::default(), views: left_out() };
     page(&nothing);
-    assert!(page(&report("", Ok(TestViews::new(0)))).contains("There are no test views"));
+    assert!(page(&report("", Ok(TestViews::default()))).contains("There are no test views"));
 }
 
 #[test]
 fn an_older_evaluation_is_not_the_result() {
     let mut report = report(FULL, Err(String::new()));
-    assert_eq!(report.result(), Some((21.25, 0.75, 9)));
+    let logged = Outcome { psnr: 21.25, ssim: 0.75, views: 9, left_out: 0, near_share: None };
+    assert_eq!(report.outcome(), Some(logged));
     report.facts.steps = Some(64);
-    assert_eq!(report.result(), None, "trained further since");
+    assert_eq!(report.outcome(), None, "trained further since");
     report.facts.is_done = Some(false);
     assert!(page(&report).contains("interrupted before its end"));
 }
@@ -228,7 +264,72 @@ fn linear_light_says_how_it_is_shown() {
 #[test]
 fn pictures_of_another_size_are_an_error() {
     let pixels = [[0.5; 3]; 6];
-    let pair = Pair { size: [3, 3], rendered: &pixels, photo: &pixels };
+    let pair = Pair { size: [3, 3], rendered: &pixels, photo: &pixels, depth: &[1.0; 9], unit: 1.0 };
     let error = Pictures::new(&pair).expect_err("refused").to_string();
     assert!(error.contains("3x3") && error.contains("found 6"), "{error}");
+    let pixels = [[0.5; 3]; 9];
+    let pair = Pair { size: [3, 3], rendered: &pixels, photo: &pixels, depth: &[1.0; 8], unit: 1.0 };
+    let error = Pictures::new(&pair).expect_err("refused").to_string();
+    assert!(error.contains("found 8"), "{error}");
+}
+
+/// The colours of a picture in a page, by pixel.
+fn decoded(address: &str) -> image::RgbImage {
+    let data = address.split_once("base64,").expect("a data address").1;
+    let bytes = base64::Engine::decode(&base64::engine::general_purpose::STANDARD, data).expect("base64");
+    image::load_from_memory(&bytes).expect("a picture").to_rgb8()
+}
+
+#[test]
+fn depth_is_bright_where_it_is_near_and_black_where_nothing_is() {
+    let pixels = [[0.5; 3]; 5];
+    let pair = Pair {
+        size: [5, 1],
+        rendered: &pixels,
+        photo: &pixels,
+        depth: &[0.0, 1e-6, 1.0, 2.0, 1e9],
+        unit: 2.0,
+    };
+    let pictures = Pictures::new(&pair).expect("drawn");
+    let depth = decoded(&pictures.depth);
+    let colors: Vec<_> = (0..5).map(|x| depth[(x, 0)].0).collect();
+    assert_eq!([colors[0], colors[1], colors[4]], [[0; 3], [0xfd, 0xe7, 0x25], [0x44, 0x01, 0x54]]);
+    assert_eq!(colors[3], [0x21, 0x91, 0x8c], "the unit is in the middle");
+    let brightness = |color: &[u8; 3]| color.iter().map(|&value| u32::from(value)).sum::<u32>();
+    assert!(colors[1..].is_sorted_by_key(|color| std::cmp::Reverse(brightness(color))), "{colors:?}");
+}
+
+#[test]
+fn fog_is_warned_of() {
+    let foggy = page(&report(FULL, Ok(views(3, 20))));
+    assert!(foggy.contains("<strong>Fog: </strong>") && foggy.contains("10 %</dd>"), "a tenth of the pixels");
+    assert!(foggy.contains("where 1 is the distance from the camera") && foggy.contains("depth, 1 = 2.000"));
+    let with = |scores: ViewScores| {
+        let mut views = TestViews::default();
+        views.add(0, scores, || anyhow::bail!("nothing to see")).expect_err("says so");
+        page(&report(FULL, Ok(views)))
+    };
+    let scores = ViewScores { name: "clear.png".to_owned(), psnr: 30.0, ssim: 0.9, depths: None };
+    let untold = with(scores.clone());
+    assert!(untold.contains("median depth") && untold.contains("is not told: the optical axes do not cross"));
+    assert!(!untold.contains("Fog: "));
+    let empty = View { width: 1, height: 1, color: vec![[0.0; 4]], depth: vec![0.0] };
+    let clear = with(ViewScores { depths: Some(Depths::of(&empty, &[], 1.0)), ..scores });
+    assert!(
+        clear.contains("no pixel shows anything") && clear.contains("0 %</dd>") && !clear.contains("Fog: ")
+    );
+}
+
+#[test]
+fn what_was_left_out_is_said() {
+    let mut views = views(3, 8);
+    views.left_out = 2;
+    let html = page(&report(FULL, Ok(views)));
+    assert!(html.contains("PSNR of 3 of 5 test views") && html.contains("2 more were left out"), "{html}");
+    assert!(html.contains("nerf eval RUN DATASET"));
+    let log = "{\"step\":32,\"seconds\":1,\"eval_psnr\":20.5,\"eval_ssim\":0.5,\"views\":1,\"views_left_out\":6,\"near_share\":0.25}";
+    let html = page(&report(log, Err(String::new())));
+    assert!(
+        html.contains("PSNR of 1 of 7 test views") && html.contains("25 %</dd>") && html.contains("Fog: ")
+    );
 }

@@ -162,7 +162,7 @@ impl<'a> Course<'a> {
             return Ok(());
         }
         let clock = Instant::now();
-        let Some(Means { psnr, views, .. }) = exam.few()? else { return Ok(()) };
+        let Some(Means { psnr, views, near_share, .. }) = exam.few()? else { return Ok(()) };
         progress.say(&format!("step {step}: PSNR {psnr:.2} dB over {views} test views"));
         self.log.write(&json!({
             "step": step,
@@ -170,6 +170,7 @@ impl<'a> Course<'a> {
             "eval_psnr": psnr,
             "eval_seconds": clock.elapsed().as_secs_f64(),
             "views": views,
+            "near_share": near_share,
         }))
     }
 
