@@ -1,6 +1,6 @@
 // The fused kernel: renders a ray, takes its loss, and walks back once for the gradients of colours and
 // log-densities. Section 2 of the design; the same formulas as `reference::composite`.
-// Needs: counters, exp, sum, transmittance, loss, depth_loss, weights.
+// Needs: counters, exp, sum, transmittance, loss, depth_loss, distortion, weights.
 
 var<storage, read> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
@@ -16,7 +16,8 @@ var<storage, read> backgrounds: array<vec4<f32>>;
 var<storage, read_write> rendered: array<vec4<f32>>;
 // Squared errors of the four channels with their weights; opacity's also holds what the depth adds.
 var<storage, read_write> ray_errors: array<vec4<f32>>;
-// dL/dc in rgb and dL/ds in w. Between the walks it holds tau and the root of T of each sample.
+// dL/dc in rgb and dL/ds in w. Between the walks it holds tau and the root of T of each
+// sample, and what the distortion sums up in front of it.
 tensor<read_write> d_color: vec4<f32>;
 
 @compute @workgroup_size(64)
@@ -34,6 +35,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var depth = sum_of(vec4(0.0));
     var sum = sum_of(vec4(0.0));
     var distance = depth_begin(index);
+    var spread = spread_begin(index);
     for (var i = span.x; i < end; i++) {
         let step = kept_steps_load(i);
         depth = sum_add(depth, vec4(step.z), zero);
@@ -44,17 +46,19 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         weight_store(i, root * (root * alpha));
         sum = sum_add(sum, squared_times(root, step.w * alpha * own), zero);
         distance = depth_forward(distance, i, root, step.w * alpha, zero);
-        d_color_store(i, vec4(tau, root, 0.0, 0.0));
+        d_color_store(i, vec4(tau, root, spread_before(spread)));
+        spread = spread_forward(spread, i, root * (root * step.w * alpha));
         depth = sum_add(depth, vec4(tau), zero);
     }
     let result = sum.value + squared_times(exp_accurate(-0.5 * (depth.value.x + tail)), background);
     let error = result - targets[index];
     let weight = loss_weight(result, targets[index]);
     rendered[index] = result;
-    ray_errors[index] = weight * error * error + vec4(0.0, 0.0, 0.0, depth_squared_error(distance));
+    ray_errors[index] = weight * error * error + vec4(0.0, 0.0, 0.0, depth_squared_error(distance) + spread_error(spread));
 
     let d_result = weight * error / (2.0 * f32(counters.rays_used));
     distance = depth_turn(distance);
+    spread = spread_turn(spread);
     var behind = sum_of(exp_accurate(-tail) * background);
     var missing = opacity(tail);
     for (var i = end; i > span.x; i--) {
@@ -63,11 +67,15 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let part = passage(known.x, step.z, step.w);
         let color = vec4(color_load(i - 1u).rgb, 1.0);
         let by_color = dot(d_result, gradient_color(part.alpha, color, behind) - missing * color);
-        let d_s = step.w * part.tau * (by_color + depth_gradient(distance, i - 1u, part.alpha, missing));
+        let sample_weight = known.y * (known.y * step.w * part.alpha);
+        let by_depth = depth_gradient(distance, i - 1u, part.alpha, missing);
+        let by_spread = spread_gradient(spread, i - 1u, known.zw, sample_weight, part.alpha, missing);
+        let d_s = step.w * part.tau * (by_color + by_depth + by_spread);
         let d_c = squared_times(known.y, step.w * part.alpha * d_result).rgb;
         let root = gradient_root(known.y, part.passing_root);
         d_color_store(i - 1u, vec4(d_c, root * (root * d_s)));
         distance = depth_backward(distance, i - 1u, part, zero);
+        spread = spread_backward(spread, i - 1u, known.zw, sample_weight, part, zero);
         behind = behind_next(behind, color, part, zero);
         missing = missing_next(missing, part);
     }

@@ -134,6 +134,8 @@ pub struct Loss {
     /// Weight of the squared error of the depth, in sides of the inner cube, where photos have depth; 0 leaves depth
     /// out.
     pub depth: f64,
+    /// Weight of the distortion (Barron et al. 2022), which pulls the weights along a ray together; 0 leaves it out.
+    pub distortion: f64,
 }
 
 /// How errors of the colour count.
@@ -375,6 +377,7 @@ impl Config {
         real("selection.light_share", selection.light_share, 0.0, 1.0)?;
         real("selection.stop_transmittance", selection.stop_transmittance, 0.0, 0.5)?;
         real("loss.depth", loss.depth, 0.0, 1e6)?;
+        real("loss.distortion", loss.distortion, 0.0, 1e3)?;
         real("optimizer.learning_rate", optimizer.learning_rate, 0.0, 1e3)?;
         real("optimizer.final_learning_rate", optimizer.final_learning_rate, 0.0, 1e3)?;
         real("optimizer.beta_1", optimizer.beta_1, 0.0, 0.999_999)?;

@@ -331,6 +331,9 @@ impl Plan {
             ("RELATIVE_FLOOR", RELATIVE_FLOOR),
             ("RELATIVE_DARKEST", RELATIVE_DARKEST),
             ("DEPTH_WEIGHT", config.loss.depth),
+            ("DISTORTION", config.loss.distortion),
+            ("OPACITY_WEIGHT", std::env::var("X_OPACITY").map_or(1.0, |v| v.parse().unwrap())),
+            ("DENSITY_OFFSET", std::env::var("X_OFFSET").map_or(0.0, |v| v.parse().unwrap())),
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         let background = config.background.solid().map(|value| value / self.needs.grey);
@@ -367,6 +370,13 @@ impl Plan {
 
     fn depth_loss(&self) -> Part {
         if self.needs.depth { part!("depth_loss/squared.wgsl") } else { part!("depth_loss/none.wgsl") }
+    }
+
+    fn distortion(&self) -> Part {
+        match self.config.loss.distortion > 0.0 {
+            true => part!("distortion/pairs.wgsl"),
+            false => part!("distortion/none.wgsl"),
+        }
     }
 
     fn depth_target(&self) -> Part {

@@ -1,11 +1,7 @@
-// Needs: counters, sum, transmittance, behind_next. Provides: the depth's share of the loss, DEPTH_WEIGHT / M times the
+// Needs: counters, sum, transmittance, behind_next, kept_distance. Provides: the depth's share of the loss, DEPTH_WEIGHT / M times the
 // square of sum_i w_i (t_i - g) over the rays whose distance g is known. It is a fifth channel whose colour is t_i - g,
 // over 0: what is transparent is left to the other channels. Distances are in sides of the inner cube.
 
-tensor<read> ray_origins: vec4<f32>;
-tensor<read> ray_directions: vec4<f32>;
-tensor<read> samples: vec4<f32>;
-tensor<read> kept_rows: vec2<u32>;
 // 0 where unknown.
 var<storage, read> depth_targets: array<f32>;
 
@@ -27,8 +23,7 @@ fn depth_begin(ray: u32) -> DepthRay {
 
 // The channel's colour of a sample.
 fn depth_offset(depth: DepthRay, i: u32) -> vec4<f32> {
-    let position = samples_load(kept_rows_load(i).x).xyz;
-    let distance = dot(position - depth.origin, depth.direction) * DENSITY_SCALE;
+    let distance = kept_distance(depth.origin, depth.direction, i);
     return vec4(select(0.0, distance - depth.goal, depth.goal > 0.0), 0.0, 0.0, 0.0);
 }
 

@@ -34,7 +34,7 @@ pub fn depth_and_relative_errors(subject: &Subject) -> Result<Tally> {
         Tally::new("depth and relative errors", 2e-5, "T = e^-depth, and distances of up to 4 round");
     for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
         let mut setup = Setup::tiny().transmittance(convention);
-        setup.config.loss = Loss { color: ColorLoss::Relative, depth: 0.3 };
+        setup.config.loss = Loss { color: ColorLoss::Relative, depth: 0.3, ..Loss::default() };
         setup.needs.depth = true;
         (setup.config.batch.kept, setup.config.batch.samples) = (8192, 8192);
         let bench = subject.workbench(setup)?;

@@ -101,9 +101,14 @@ pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -
         plan.transmittance(),
         plan.loss(),
         plan.depth_loss(),
+        plan.distortion(),
         weights,
         part!("composite.wgsl"),
     ];
+    let mut parts = parts.to_vec();
+    if plan.needs.depth || plan.config.loss.distortion > 0.0 {
+        parts.push(part!("common/kept_distance.wgsl"));
+    }
     let kernel = plan.kernel(gpu, "composite", &parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }
