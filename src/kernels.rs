@@ -26,7 +26,7 @@ pub mod viewing;
 mod workspace;
 
 pub use needs::Needs;
-pub use shared::{Camera, Counters, Step};
+pub use shared::{Camera, Counters, Progress, Step};
 pub use workspace::Workspace;
 
 use crate::config::{Accumulation, Background, ColorLoss, Config, Transmittance};
@@ -44,6 +44,7 @@ pub type Part = (&'static str, &'static str);
 pub(crate) const RANDOM: Part = part!("common/random.wgsl");
 const STEP: Part = part!("common/step.wgsl");
 const COUNTERS: Part = part!("common/counters.wgsl");
+const PROGRESS: Part = part!("common/progress.wgsl");
 pub(crate) const RAY: Part = part!("common/ray.wgsl");
 pub(crate) const SINE: Part = part!("common/sine.wgsl");
 pub(crate) const CAMERA: Part = part!("common/camera.wgsl");
@@ -119,6 +120,8 @@ pub struct Plan {
     pub memory: Memory,
     /// Chunks of samples whose weight gradients are summed apart: what runs side by side.
     pub chunks: usize,
+    /// How much of a view is in work at once.
+    pub rounds: viewing::Rounds,
 }
 
 /// What a plan depends on of an adapter.
@@ -178,7 +181,8 @@ impl Plan {
         };
         let chunks = if adapter.is_cpu { 32 } else { 512 };
         let product = layer::Product { rows, shared_weights };
-        Self { config, layout, needs, product, accumulation, memory: adapter.memory, chunks }
+        let rounds = viewing::Rounds::suited_to(adapter);
+        Self { config, layout, needs, product, accumulation, memory: adapter.memory, chunks, rounds }
     }
 
     /// The smallest step in box units.
@@ -236,6 +240,7 @@ impl Plan {
         let shared = [
             (STEP, Step::LAYOUT),
             (COUNTERS, Counters::LAYOUT),
+            (PROGRESS, Progress::LAYOUT),
             (CAMERA, Camera::LAYOUT),
             (GRID, Level::LAYOUT),
         ];
@@ -280,6 +285,9 @@ impl Plan {
             ("TARGET_SAMPLES", config.batch.samples / 8 * 7),
             ("LEAST_RAYS", 16),
             ("MOST_RAYS", config.batch.rays),
+            ("ROUND_SAMPLES", self.rounds.samples),
+            ("MOST_QUOTA", self.rounds.most_quota),
+            ("NO_PIXEL", u32::MAX as usize),
             ("DISPATCH_RAYS", dispatch::RAYS),
             ("DISPATCH_ENCODE", dispatch::ENCODE),
             ("DISPATCH_SAMPLE_TILES", dispatch::SAMPLE_TILES),
@@ -306,6 +314,7 @@ impl Plan {
             ("T_NEAR", config.march.near / self.density_scale()),
             ("KEEP_PROBABILITY", config.selection.keep_probability.max(1e-6)),
             ("STOP_TRANSMITTANCE", config.selection.stop_transmittance),
+            ("COLOR_WEIGHT", self.color_weight()),
             ("OCCUPANCY_DECAY", config.occupancy.decay),
             ("OCCUPANCY_THRESHOLD", config.occupancy.threshold),
             ("BETA_1", config.optimizer.beta_1),
@@ -319,6 +328,11 @@ impl Plan {
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         let background = config.background.solid().map(|value| value / self.needs.grey);
         source.constant("BACKGROUND", vec3(background))
+    }
+
+    /// Without a bound on the colours there is none on the error of one that stands for others.
+    fn color_weight(&self) -> f64 {
+        if self.needs.hdr { viewing::LEAST_WEIGHT } else { self.rounds.color_weight }
     }
 
     fn stepping(&self) -> Part {

@@ -5,6 +5,7 @@ use super::marching::reference;
 use super::{Setup, Subject, Tally, Workbench};
 use crate::camera::{Camera, Lens, LensKind};
 use crate::dataset::Bounds;
+use crate::kernels::viewing::LEAST_WEIGHT;
 use crate::reference::composite::{mean_depth, opacity, optical_depth, transmittances};
 use crate::reference::lens;
 use crate::reference::march::BoxRay;
@@ -22,7 +23,12 @@ const SIZE: (u32, u32) = (11, 9);
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn rendered_views(subject: &Subject) -> Result<Tally> {
+pub fn rendered_views(subject: &Subject) -> Result<Vec<Tally>> {
+    let mut shared = Tally::new(
+        "rendered views: shared colours",
+        2e-3,
+        "a colour stands for that of samples whose weights sum to 0.001",
+    );
     let mut tally = Tally::new(
         "rendered views",
         2e-5,
@@ -41,14 +47,17 @@ pub fn rendered_views(subject: &Subject) -> Result<Tally> {
         let mut setup = Setup::tiny().network(32, 2).hdr(hdr);
         setup.needs.cascades = cascades;
         setup.config.selection.stop_transmittance = STOP;
-        let bench = subject.workbench(setup)?;
+        let mut bench = subject.workbench(setup)?;
         bench.randomise(&mut Random::new(90), 2.0, 1.5)?;
         bench.write("occupancy_bits", &vec![u32::MAX; bench.plan.cell_count() / 32]);
         let bounds =
             Bounds { center: DVec3::new(1.0, 2.0, 3.0), half: 0.75, cascades, source: String::new() };
-        compare(&mut tally, &bench, &bounds, &camera(&bounds, lens))?;
+        let camera = camera(&bounds, lens);
+        compare(&mut shared, &bench, &bounds, &camera)?;
+        bench.plan.rounds.color_weight = LEAST_WEIGHT;
+        compare(&mut tally, &bench, &bounds, &camera)?;
     }
-    Ok(tally)
+    Ok(vec![tally, shared])
 }
 
 fn camera(bounds: &Bounds, lens: Lens) -> Camera {

@@ -2,7 +2,9 @@
 
 use super::density::{forward, layer_stage};
 use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
-use super::{COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, Plan, RANDOM, STEP, Workspace, dispatch};
+use super::{
+    COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, Plan, RANDOM, STEP, Workspace, dispatch, viewing,
+};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::{Size, Stage};
@@ -18,8 +20,8 @@ pub const COLOR_HIDDEN: [&str; 4] = ["color_hidden_1", "color_hidden_2", "color_
 pub enum Selection {
     /// Those above the weight floor, and some of the others.
     Training,
-    /// All in front of the point where the ray is opaque.
-    All,
+    /// Of a view's rays, one for every [`super::viewing::Rounds::color_weight`].
+    View,
 }
 
 /// The kept samples and the colour network's activations.
@@ -41,11 +43,20 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
-    let floor = match selection {
-        Selection::Training => plan.config.selection.weight_floor as f32,
-        // Whatever is lighter does not show in 32 bits.
-        Selection::All => 1e-12,
+    let [select, kept] = match selection {
+        Selection::Training => training_selection(gpu, plan, workspace)?,
+        Selection::View => [viewing::select(gpu, plan, workspace)?, viewing::kept(gpu, plan, workspace)?],
     };
+    let input = plan.kernel(gpu, "color input", &[COUNTERS, HARMONICS, part!("color_input.wgsl")])?;
+    let input = Stage::indirect(workspace.bind(gpu, &input, &[])?, workspace.get("dispatch"), dispatch::KEPT);
+    let mut stages = vec![select, scan(gpu, plan, workspace, Scanned::Kept)?, kept, input];
+    stages.extend(network(gpu, plan, workspace)?);
+    Ok(stages)
+}
+
+/// The kernels that choose and pack the samples of a training.
+fn training_selection(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<[Stage; 2]> {
+    let floor = plan.config.selection.weight_floor as f32;
     let select = plan.generated_kernel(
         gpu,
         "select",
@@ -54,16 +65,11 @@ pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selectio
         format!("const WEIGHT_FLOOR = f32({floor:?});"),
     )?;
     let kept = plan.kernel(gpu, "kept", &[COUNTERS, DENSITY, part!("kept.wgsl")])?;
-    let input = plan.kernel(gpu, "color input", &[COUNTERS, HARMONICS, part!("color_input.wgsl")])?;
-    let sizes = workspace.get("dispatch");
-    let mut stages = vec![
-        Stage::indirect(workspace.bind(gpu, &select, &[])?, sizes, dispatch::RAYS),
-        scan(gpu, plan, workspace, Scanned::Kept)?,
-        Stage::indirect(workspace.bind(gpu, &kept, &[])?, sizes, dispatch::RAYS),
-        Stage::indirect(workspace.bind(gpu, &input, &[])?, sizes, dispatch::KEPT),
-    ];
-    stages.extend(network(gpu, plan, workspace)?);
-    Ok(stages)
+    let over_rays = |kernel| -> Result<Stage> {
+        let sizes = workspace.get("dispatch");
+        Ok(Stage::indirect(workspace.bind(gpu, kernel, &[])?, sizes, dispatch::RAYS))
+    };
+    Ok([over_rays(&select)?, over_rays(&kept)?])
 }
 
 /// The colour network's layers.
