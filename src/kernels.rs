@@ -314,7 +314,7 @@ impl Plan {
             ("T_NEAR", config.march.near / self.density_scale()),
             ("KEEP_PROBABILITY", config.selection.keep_probability.max(1e-6)),
             ("STOP_TRANSMITTANCE", config.selection.stop_transmittance),
-            ("COLOR_WEIGHT", self.color_weight()),
+            ("COLOR_WEIGHT", self.rounds.color_weight(&self.needs)),
             ("OCCUPANCY_DECAY", config.occupancy.decay),
             ("OCCUPANCY_THRESHOLD", config.occupancy.threshold),
             ("BETA_1", config.optimizer.beta_1),
@@ -328,11 +328,6 @@ impl Plan {
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         let background = config.background.solid().map(|value| value / self.needs.grey);
         source.constant("BACKGROUND", vec3(background))
-    }
-
-    /// Without a bound on the colours there is none on the error of one that stands for others.
-    fn color_weight(&self) -> f64 {
-        if self.needs.hdr { viewing::LEAST_WEIGHT } else { self.rounds.color_weight }
     }
 
     fn stepping(&self) -> Part {

@@ -1,8 +1,8 @@
 //! What only rendering needs: how much of a view is in work at once, its rays and their compositing.
 
 use super::{
-    CAMERA, COUNTERS, Camera, DENSITY, EXP, PROGRESS, Part, Plan, Progress, RAY, RAY_STORE, SUM, Traits,
-    Workspace, dispatch,
+    CAMERA, COUNTERS, Camera, DENSITY, EXP, Needs, PROGRESS, Part, Plan, Progress, RAY, RAY_STORE, SUM,
+    Traits, Workspace, dispatch,
 };
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
@@ -33,10 +33,16 @@ impl Rounds {
     /// What suits an adapter: few samples in vain on a CPU, few rounds on a GPU.
     pub(super) fn suited_to(adapter: Traits) -> Self {
         if adapter.is_cpu {
-            Self { rays: 1 << 13, samples: 1 << 16, most_quota: 32, band: 1 << 20, color_weight: 1e-3 }
+            Self { rays: 1 << 13, samples: 1 << 15, most_quota: 16, band: 1 << 20, color_weight: 1e-3 }
         } else {
-            Self { rays: 1 << 16, samples: 1 << 20, most_quota: 256, band: 1 << 22, color_weight: 1e-3 }
+            Self { rays: 1 << 15, samples: 1 << 18, most_quota: 64, band: 1 << 22, color_weight: 1e-3 }
         }
+    }
+
+    /// The weight of a colour. Without a bound on the colours there is none on the error of one that stands for
+    /// others: in linear light every sample has its own.
+    pub(super) fn color_weight(&self, needs: &Needs) -> f64 {
+        if needs.hdr { LEAST_WEIGHT } else { self.color_weight }
     }
 }
 
