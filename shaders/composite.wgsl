@@ -1,12 +1,18 @@
 // The fused kernel: renders a ray, takes its loss, and walks back once for the gradients of colours and
 // log-densities. Section 2 of the design; the same formulas as `reference::composite`.
+//
+// Where samples were left out, the ray's colour is known by two estimates that know nothing of each other, and its
+// squared error is their product: (R' - g)(R'' - g), whose mean is the square of the mean error. The square of a single
+// estimate would hold its variance too, and gradients would make rays opaque too early, where nothing is left out. A
+// whole ray has one colour, and both are that.
 // Needs: counters, exp, sum, transmittance, loss, depth_loss, distortion, weights.
 
 var<storage, read> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
-// Log-density, step length, optical depth left out in front of the sample, and gain: how many times its own weight its
-// colour has.
+// Log-density, step length, and optical depth left out in front of the sample.
 tensor<read> kept_steps: vec4<f32>;
+// How many times its own weight a sample's colour has in both estimates.
+tensor<read> kept_gains: vec2<f32>;
 // Optical depth behind the last kept sample.
 var<storage, read> ray_tails: array<f32>;
 tensor<read> color: vec4<f32>;
@@ -33,51 +39,68 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let zero = span.x >> 31u;
     let tail = ray_tails[index];
     var depth = sum_of(vec4(0.0));
-    var sum = sum_of(vec4(0.0));
+    var sums = array(sum_of(vec4(0.0)), sum_of(vec4(0.0)));
     var distance = depth_begin(index);
     var spread = spread_begin(index);
     for (var i = span.x; i < end; i++) {
         let step = kept_steps_load(i);
+        let gains = kept_gains_load(i);
         depth = sum_add(depth, vec4(step.z), zero);
         let tau = optical_depth(step.x, step.y);
         let root = exp_accurate(-0.5 * transmittance_depth(depth.value.x, tau));
         let alpha = opacity(tau);
         let own = vec4(color_load(i).rgb, 1.0);
         weight_store(i, root * (root * alpha));
-        sum = sum_add(sum, squared_times(root, step.w * alpha * own), zero);
-        distance = depth_forward(distance, i, root, step.w * alpha, zero);
+        sums[0] = sum_add(sums[0], squared_times(root, gains.x * alpha * own), zero);
+        sums[1] = sum_add(sums[1], squared_times(root, gains.y * alpha * own), zero);
+        let gain = 0.5 * (gains.x + gains.y);
+        distance = depth_forward(distance, i, root, gain * alpha, zero);
         d_color_store(i, vec4(tau, root, spread_before(spread)));
-        spread = spread_forward(spread, i, root * (root * step.w * alpha));
+        spread = spread_forward(spread, i, root * (root * gain * alpha));
         depth = sum_add(depth, vec4(tau), zero);
     }
-    let result = sum.value + squared_times(exp_accurate(-0.5 * (depth.value.x + tail)), background);
-    let error = result - targets[index];
+    let through = squared_times(exp_accurate(-0.5 * (depth.value.x + tail)), background);
+    let first = sums[0].value + through;
+    let second = sums[1].value + through;
+    let result = 0.5 * (first + second);
+    let errors = array(first - targets[index], second - targets[index]);
     let weight = loss_weight(result, targets[index]);
     rendered[index] = result;
-    ray_errors[index] = weight * error * error + vec4(0.0, 0.0, 0.0, depth_squared_error(distance) + spread_error(spread));
+    let further = depth_squared_error(distance) + spread_error(spread);
+    ray_errors[index] = weight * errors[0] * errors[1] + vec4(0.0, 0.0, 0.0, further);
 
-    let d_result = weight * error / (2.0 * f32(counters.rays_used));
+    // dL/dR of each estimate, of which the error of the other is a factor.
+    let share = weight / (4.0 * f32(counters.rays_used));
+    let d_results = array(share * errors[1], share * errors[0]);
     distance = depth_turn(distance);
     spread = spread_turn(spread);
-    var behind = sum_of(exp_accurate(-tail) * background);
-    var missing = opacity(tail);
+    var behind = array(sum_of(exp_accurate(-tail) * background), sum_of(exp_accurate(-tail) * background));
+    var missing = vec2(opacity(tail));
     for (var i = end; i > span.x; i--) {
         let known = d_color_load(i - 1u);
-        let step = kept_steps_load(i - 1u);
-        let part = passage(known.x, step.z, step.w);
+        let gains = kept_gains_load(i - 1u);
+        let gain = 0.5 * (gains.x + gains.y);
+        let part = passage(known.x, kept_steps_load(i - 1u).z, gain);
         let color = vec4(color_load(i - 1u).rgb, 1.0);
-        let by_color = dot(d_result, gradient_color(part.alpha, color, behind) - missing * color);
-        let sample_weight = known.y * (known.y * step.w * part.alpha);
-        let by_depth = depth_gradient(distance, i - 1u, part.alpha, missing);
-        let by_spread = spread_gradient(spread, i - 1u, known.zw, sample_weight, part.alpha, missing);
-        let d_s = step.w * part.tau * (by_color + by_depth + by_spread);
-        let d_c = squared_times(known.y, step.w * part.alpha * d_result).rgb;
+        let alpha = part.alpha;
+        let first = dot(d_results[0], gradient_color(alpha, color, behind[0]) - missing.x * color);
+        let second = dot(d_results[1], gradient_color(alpha, color, behind[1]) - missing.y * color);
+        let sample_weight = known.y * (known.y * gain * alpha);
+        let mean_missing = 0.5 * (missing.x + missing.y);
+        let by_depth = depth_gradient(distance, i - 1u, alpha, mean_missing);
+        let by_spread = spread_gradient(spread, i - 1u, known.zw, sample_weight, alpha, mean_missing);
+        let d_s = part.tau * (gains.x * first + gains.y * second + gain * (by_depth + by_spread));
+        let d_c = squared_times(known.y, alpha * (gains.x * d_results[0] + gains.y * d_results[1])).rgb;
         let root = gradient_root(known.y, part.passing_root);
         d_color_store(i - 1u, vec4(d_c, root * (root * d_s)));
         distance = depth_backward(distance, i - 1u, part, zero);
         spread = spread_backward(spread, i - 1u, known.zw, sample_weight, part, zero);
-        behind = behind_next(behind, color, part, zero);
-        missing = missing_next(missing, part);
+        behind[0] = behind_next(behind[0], color, with_gain(part, gains.x), zero);
+        behind[1] = behind_next(behind[1], color, with_gain(part, gains.y), zero);
+        missing = vec2(
+            missing_next(missing.x, with_gain(part, gains.x)),
+            missing_next(missing.y, with_gain(part, gains.y)),
+        );
     }
 }
 
@@ -86,6 +109,9 @@ struct Passage {
     tau: f32,
     alpha: f32,
     passing_root: f32,
+    // What of the light passes those in front, and what does not.
+    gap_passing: f32,
+    gap_alpha: f32,
     // What the sample's colour counts beyond alpha, and what is taken from the colour behind beyond alpha of it, seen
     // from the far end of the kept sample in front. Both are 0 where nothing was left out.
     excess: f32,
@@ -93,10 +119,16 @@ struct Passage {
 }
 
 fn passage(tau: f32, gap: f32, gain: f32) -> Passage {
-    let alpha = opacity(tau);
-    let passing_root = exp_accurate(-0.5 * tau);
-    let excess = alpha * ((gain - 1.0) * exp_accurate(-gap) - opacity(gap));
-    return Passage(tau, alpha, passing_root, excess, passing_root * passing_root * opacity(gap));
+    let root = exp_accurate(-0.5 * tau);
+    let gap_alpha = opacity(gap);
+    let part = Passage(tau, opacity(tau), root, exp_accurate(-gap), gap_alpha, 0.0, root * root * gap_alpha);
+    return with_gain(part, gain);
+}
+
+fn with_gain(part: Passage, gain: f32) -> Passage {
+    var other = part;
+    other.excess = part.alpha * ((gain - 1.0) * part.gap_passing - part.gap_alpha);
+    return other;
 }
 
 // What is seen from in front of a sample, from its colour and what is seen from just behind it.

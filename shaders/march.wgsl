@@ -1,5 +1,5 @@
 // Marks the steps of each ray that lie in occupied cells: one bit per step, and their number.
-// Needs: random, step, counters, ray, occupancy, stepping.
+// Needs: random, step, counters, ray, occupancy, stepping, extent.
 
 var<storage, read> counters: Counters;
 tensor<read> occupancy_bits: u32;
@@ -32,12 +32,14 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let first = march_start(ray, index);
     var count = 0u;
     var word = 0u;
-    var word_index = 0u;
-    var i = 0u;
-    while i < MAX_STEPS {
+    var i = extent_begin(index);
+    var word_index = i >> 5u;
+    let most = extent_most();
+    while i < MAX_STEPS && count < most {
         let t = stepping_distance(first + f32(i));
         // Written so that anything not a number ends the ray.
         if !(t < ray.t_far) {
+            i = MAX_STEPS;
             break;
         }
         let position = ray.origin + t * ray.direction;
@@ -61,4 +63,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         ray_steps[index * STEP_WORDS + word_index] = word;
     }
     ray_spans[index] = vec2(0u, count);
+    extent_end(index, i);
 }

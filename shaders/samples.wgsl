@@ -1,5 +1,5 @@
 // Writes the marked steps of each ray as samples: position in box space and length of the step.
-// Needs: random, step, counters, ray, stepping, march_start.
+// Needs: random, step, counters, ray, stepping, march_start, extent.
 
 var<storage, read> counters: Counters;
 var<storage, read> ray_steps: array<u32>;
@@ -20,7 +20,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let ray = ray_load(index);
     let first = march_start(ray, index);
     var written = 0u;
-    var word_index = 0u;
+    var word_index = extent_first(index) >> 5u;
     while written < span.y && word_index < STEP_WORDS {
         var word = ray_steps[index * STEP_WORDS + word_index];
         while word != 0u && written < span.y {

@@ -1,8 +1,9 @@
 // Decides which samples of a ray get colour and gradients. A sample of at least WEIGHT_FLOOR is heavy and is kept.
-// The light ones between two heavy ones form groups of at least that weight, of which one member, drawn by weight,
+// The light ones between two heavy ones form groups of about twice that weight. Of each, one member, drawn by weight,
 // stands for all: its colour has the weight of the group, so that the mean over all draws is the colour of the whole
-// ray. A group that stays lighter than LIGHT_SHARE of the floor is kept by chance; what that adds to the ray's weight
-// or takes from it is made up for by the next kept sample. Opacity and transmittance are those of all samples.
+// ray. That is done twice, for two estimates of the colour that know nothing of each other; see `composite.wgsl`. A
+// group that stays lighter than LIGHT_SHARE of the floor is kept by chance; what that adds to the ray's weight or takes
+// from it is made up for by the estimate's next kept sample. Opacity and transmittance are those of all samples.
 // Nothing is kept behind the point where the ray is opaque; see `reference::selection`.
 // Needs: random, step, counters, exp, density, refresh.
 
@@ -14,31 +15,35 @@ var<storage, read_write> kept_spans: array<vec2<u32>>;
 // Optical depth behind the last kept sample of each ray.
 var<storage, read_write> ray_tails: array<f32>;
 // The chosen samples of ray r from index ray_spans[r].x on: sample (as a number), the optical depth of those left out
-// in front of it, and its gain: the weight that its colour has, as a multiple of its own.
+// in front of it, and its gains: the weight that its colour has in both estimates, as a multiple of its own.
 tensor<write> chosen: vec4<f32>;
+
+// A sample: its index, its weight, the optical depth in front of it and its own.
+struct Member {
+    sample: u32,
+    weight: f32,
+    before: f32,
+    tau: f32,
+}
 
 struct Walk {
     // Where the next choice goes.
     next: u32,
     // Optical depth up to the far end of the last kept sample.
     kept_depth: f32,
-    // Weight that the next kept sample makes up for.
-    carry: f32,
-    // The open group of light samples: its weight, and the member that stands for it.
+    // Weights that the estimates' next kept samples make up for.
+    carry: vec2<f32>,
+    // The open group of light samples: its weight, and the members that stand for it.
     light: f32,
-    member: u32,
-    member_weight: f32,
-    // Optical depth up to that member, and of itself.
-    member_depth: f32,
-    member_tau: f32,
+    first: Member,
+    second: Member,
 }
 
-fn keep(walk: Walk, sample: u32, before: f32, tau: f32, gain: f32) -> Walk {
-    chosen_store(walk.next, vec4(f32(sample), before - walk.kept_depth, gain, 0.0));
+fn keep(walk: Walk, member: Member, gains: vec2<f32>) -> Walk {
+    chosen_store(walk.next, vec4(f32(member.sample), member.before - walk.kept_depth, gains));
     var after = walk;
     after.next++;
-    after.kept_depth = before + tau;
-    after.carry = 0.0;
+    after.kept_depth = member.before + member.tau;
     return after;
 }
 
@@ -48,16 +53,42 @@ fn close(walk: Walk) -> Walk {
         return walk;
     }
     let probability = min(walk.light / (WEIGHT_FLOOR * LIGHT_SHARE), 1.0);
+    let weight = walk.light / probability;
+    let luck = vec2(
+        random_f32(step.stream, walk.first.sample, RANDOM_LIGHT),
+        random_f32(step.stream, walk.second.sample, RANDOM_LIGHT + 1u),
+    );
+    let kept = luck < vec2(probability);
+    let gains = select(vec2(0.0), (weight + walk.carry) / vec2(walk.first.weight, walk.second.weight), kept);
     var after = walk;
-    if random_f32(step.stream, walk.member, RANDOM_LIGHT) < probability {
-        let weight = walk.light / probability;
-        let gain = (weight + walk.carry) / walk.member_weight;
-        after = keep(walk, walk.member, walk.member_depth, walk.member_tau, gain);
-        after.carry = walk.light - weight;
-    } else {
-        after.carry += walk.light;
-    }
+    after.carry = select(walk.carry + walk.light, vec2(walk.light - weight), kept);
     after.light = 0.0;
+    let is_same = walk.first.sample == walk.second.sample;
+    if is_same && any(kept) {
+        return keep(after, walk.first, gains);
+    }
+    if kept.x && walk.first.sample < walk.second.sample {
+        after = keep(after, walk.first, vec2(gains.x, 0.0));
+    }
+    if kept.y {
+        after = keep(after, walk.second, vec2(0.0, gains.y));
+    }
+    if kept.x && walk.first.sample > walk.second.sample {
+        after = keep(after, walk.first, vec2(gains.x, 0.0));
+    }
+    return after;
+}
+
+// A light sample joins the open group.
+fn join(walk: Walk, member: Member) -> Walk {
+    var after = walk;
+    after.light += member.weight;
+    if random_f32(step.stream, member.sample, RANDOM_SELECTION) * after.light < member.weight {
+        after.first = member;
+    }
+    if random_f32(step.stream, member.sample, RANDOM_SELECTION + 1u) * after.light < member.weight {
+        after.second = member;
+    }
     return after;
 }
 
@@ -70,25 +101,21 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let span = ray_spans[index];
     var depth = 0.0;
     var transmittance = 1.0;
-    var walk = Walk(span.x, 0.0, 0.0, 0.0, 0u, 0.0, 0.0, 0.0);
+    let nobody = Member(0u, 1.0, 0.0, 0.0);
+    var walk = Walk(span.x, 0.0, vec2(0.0), 0.0, nobody, nobody);
     for (var i = span.x; i < span.x + span.y; i++) {
         let sample = samples_load(i);
         let log_density = density_log(density_out_load(i * DENSITY_QUADS).x);
         let tau = optical_depth(log_density, sample.w);
+        let member = Member(i, transmittance * opacity(tau), depth, tau);
         occupancy_refresh(sample.xyz, log_density);
-        let weight = transmittance * opacity(tau);
-        if weight >= WEIGHT_FLOOR {
+        if member.weight >= WEIGHT_FLOOR {
             walk = close(walk);
-            walk = keep(walk, i, depth, tau, 1.0 + walk.carry / max(weight, 1e-30));
-        } else if weight > 1e-30 {
-            walk.light += weight;
-            if random_f32(step.stream, i, RANDOM_SELECTION) * walk.light < weight {
-                walk.member = i;
-                walk.member_weight = weight;
-                walk.member_depth = depth;
-                walk.member_tau = tau;
-            }
-            if walk.light >= WEIGHT_FLOOR {
+            walk = keep(walk, member, 1.0 + walk.carry / max(member.weight, 1e-30));
+            walk.carry = vec2(0.0);
+        } else if member.weight > 1e-30 {
+            walk = join(walk, member);
+            if walk.light >= 2.0 * WEIGHT_FLOOR {
                 walk = close(walk);
             }
         }

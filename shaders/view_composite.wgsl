@@ -1,16 +1,19 @@
-// Renders the rays of a view: colour, opacity and mean depth as its lens defines it.
-// Needs: counters, camera, lens, exp, sum, transmittance.
+// Adds the colours of a round to a view's rays, and writes the pixels of those that ended.
+// Needs: counters, progress.
 
 var<storage, read> counters: Counters;
-var<storage, read> cameras: array<Camera>;
-tensor<read> samples: vec4<f32>;
+var<storage, read> progress: Progress;
+var<storage, read> ray_spans: array<vec2<u32>>;
 var<storage, read> kept_spans: array<vec2<u32>>;
-tensor<read> kept_rows: vec2<u32>;
-tensor<read> kept_steps: vec4<f32>;
+var<storage, read> view_slots: array<vec2<u32>>;
+tensor<read> view_pixels: u32;
+tensor<read> chosen: vec4<f32>;
 tensor<read> color: vec4<f32>;
-// Premultiplied colour without background, and opacity.
+tensor<read> ray_states: vec4<f32>;
+tensor<read_write> ray_colors: vec4<f32>;
+// Of the band: premultiplied colour without background, and opacity.
 var<storage, read_write> view_color: array<vec4<f32>>;
-// In box units; 0 where the opacity is below 1e-3.
+// Mean depth as the lens defines it, in box units; 0 where the opacity is below 1e-3.
 var<storage, read_write> view_depth: array<f32>;
 
 @compute @workgroup_size(64)
@@ -19,20 +22,27 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if index >= counters.rays_used {
         return;
     }
-    let span = kept_spans[index];
-    let camera = cameras[0];
-    var depth = 0.0;
-    var sum = vec4(0.0);
-    var distance = 0.0;
-    for (var i = span.x; i < span.x + span.y; i++) {
-        let step = kept_steps_load(i);
-        let tau = optical_depth(step.x, step.y);
-        depth += step.z;
-        let weight = step.w * exp_accurate(-transmittance_depth(depth, tau)) * opacity(tau);
-        sum += weight * vec4(color_load(i).rgb, 1.0);
-        distance += weight * lens_depth(camera, samples_load(kept_rows_load(i).x).xyz - camera.origin);
-        depth += tau;
+    let pixel = view_pixels_load(index);
+    if pixel == NO_PIXEL {
+        return;
     }
-    view_color[index] = sum;
-    view_depth[index] = select(0.0, distance / max(sum.a, 1e-6), sum.a >= 1e-3);
+    let first = ray_spans[index].x;
+    let span = kept_spans[index];
+    var sum = ray_colors_load(index).rgb;
+    for (var i = 0u; i < span.y; i++) {
+        sum += chosen_load(first + i).y * color_load(span.x + i).rgb;
+    }
+    if view_slots[index].y == 0u {
+        ray_colors_store(index, vec4(sum, 0.0));
+        return;
+    }
+    let state = ray_states_load(index);
+    let alpha = state.y;
+    // The share of the opacity that has no colour takes the mean one.
+    if state.z > 0.0 && state.z < alpha {
+        sum *= alpha / (alpha - state.z);
+    }
+    let at = pixel - progress.band_begin;
+    view_color[at] = vec4(sum, alpha);
+    view_depth[at] = select(0.0, state.w / max(alpha, 1e-6), alpha >= 1e-3);
 }

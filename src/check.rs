@@ -71,7 +71,8 @@ const CHECKS: [Check; 17] = [
 
 fn whole(subject: &Subject) -> Result<Vec<Tally>> {
     let setups = step::setups();
-    Ok(vec![step::one_step(subject, &setups[2..])?, view::rendered_views(subject)?])
+    let step = step::one_step(subject, &setups[2..])?;
+    Ok([vec![step], view::rendered_views(subject)?].concat())
 }
 
 /// Runs every check; `progress` is told how many are done, how many there are, and which one is next.

@@ -26,7 +26,7 @@ pub mod viewing;
 mod workspace;
 
 pub use needs::Needs;
-pub use shared::{Camera, Counters, Step};
+pub use shared::{Camera, Counters, Progress, Step};
 pub use workspace::Workspace;
 
 use crate::config::{Accumulation, Background, ColorLoss, Config, Transmittance};
@@ -44,6 +44,7 @@ pub type Part = (&'static str, &'static str);
 pub(crate) const RANDOM: Part = part!("common/random.wgsl");
 const STEP: Part = part!("common/step.wgsl");
 const COUNTERS: Part = part!("common/counters.wgsl");
+const PROGRESS: Part = part!("common/progress.wgsl");
 pub(crate) const RAY: Part = part!("common/ray.wgsl");
 pub(crate) const SINE: Part = part!("common/sine.wgsl");
 pub(crate) const CAMERA: Part = part!("common/camera.wgsl");
@@ -69,14 +70,14 @@ pub mod dimension {
     pub const PIXEL: u32 = 1;
     /// Where its first sample lies.
     pub const OFFSET: u32 = 2;
-    /// Which of a group of light samples stands for it.
-    pub const SELECTION: u32 = 3;
     /// Red, green and blue of its background, in this dimension and the next two.
     pub const BACKGROUND: u32 = 4;
-    /// Whether the lightest groups are kept.
-    pub const LIGHT: u32 = 7;
     /// Position in a cell of the occupancy grid, in this dimension and the next two.
     pub const CELL: u32 = 8;
+    /// Which of a group of light samples stands for it in one estimate of the colour; in the next dimension, in the other.
+    pub const SELECTION: u32 = 11;
+    /// Whether the lightest groups are kept, likewise.
+    pub const LIGHT: u32 = 13;
 }
 
 /// Indices of the dispatch sizes that kernels write.
@@ -125,6 +126,8 @@ pub struct Plan {
     pub memory: Memory,
     /// Chunks of samples whose weight gradients are summed apart: what runs side by side.
     pub chunks: usize,
+    /// How much of a view is in work at once.
+    pub rounds: viewing::Rounds,
 }
 
 /// What a plan depends on of an adapter.
@@ -184,7 +187,8 @@ impl Plan {
         };
         let chunks = if adapter.is_cpu { 32 } else { 512 };
         let product = layer::Product { rows, shared_weights };
-        Self { config, layout, needs, product, accumulation, memory: adapter.memory, chunks }
+        let rounds = viewing::Rounds::suited_to(adapter);
+        Self { config, layout, needs, product, accumulation, memory: adapter.memory, chunks, rounds }
     }
 
     /// The smallest step in box units.
@@ -248,6 +252,7 @@ impl Plan {
         let shared = [
             (STEP, Step::LAYOUT),
             (COUNTERS, Counters::LAYOUT),
+            (PROGRESS, Progress::LAYOUT),
             (CAMERA, Camera::LAYOUT),
             (GRID, Level::LAYOUT),
         ];
@@ -292,6 +297,9 @@ impl Plan {
             ("TARGET_SAMPLES", self.target_samples()),
             ("LEAST_RAYS", 16),
             ("MOST_RAYS", config.batch.rays),
+            ("ROUND_SAMPLES", self.rounds.samples),
+            ("MOST_QUOTA", self.rounds.most_quota),
+            ("NO_PIXEL", u32::MAX as usize),
             ("DISPATCH_RAYS", dispatch::RAYS),
             ("DISPATCH_ENCODE", dispatch::ENCODE),
             ("DISPATCH_SAMPLE_TILES", dispatch::SAMPLE_TILES),
@@ -322,6 +330,7 @@ impl Plan {
             ("T_NEAR", config.march.near / self.density_scale()),
             ("LIGHT_SHARE", config.selection.light_share.max(1e-6)),
             ("STOP_TRANSMITTANCE", config.selection.stop_transmittance),
+            ("COLOR_WEIGHT", self.rounds.color_weight(&self.needs)),
             ("OCCUPANCY_DECAY", config.occupancy.decay),
             ("OCCUPANCY_THRESHOLD", config.occupancy.threshold),
             ("BETA_1", config.optimizer.beta_1),

@@ -1,22 +1,22 @@
-//! The renderer: a trained field seen by any camera, in chunks of pixels.
+//! The renderer: a trained field seen by any camera, front to back in rounds of a few samples per ray.
 
 use crate::camera::{Camera, LensKind};
 use crate::dataset::Bounds;
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
-use crate::kernels::{self, Counters, Plan, Step, Workspace, color, density, marching, viewing};
+use crate::kernels::{self, Counters, Plan, Progress, Workspace, color, density, marching, viewing};
 use anyhow::{Result, bail};
 use std::collections::BTreeSet;
+use std::iter::repeat_n;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Names of the buffers that a renderer shares with a trainer, or fills from a checkpoint.
 pub const PARAMETERS: [&str; 5] = ["levels", "table", "mlp", "occupancy", "occupancy_bits"];
 
-/// Marched samples of one chunk; independent of the training's batch.
-const SAMPLES: usize = 1 << 16;
-/// Most pixels of one chunk.
-const RAYS: usize = 1 << 14;
+/// Most rounds of one submission: drivers give up on those that take seconds.
+const MOST_ROUNDS: usize = 8;
 
 /// A rendered view.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,20 +35,22 @@ pub struct View {
 #[derive(Debug)]
 pub struct Renderer {
     gpu: Arc<Gpu>,
+    plan: Plan,
     workspace: Workspace,
-    stages: Vec<Stage>,
+    /// Gives the free slots of rays to the next pixels; the last stage of a round, and what the first one begins with.
+    refill: Stage,
+    /// The others.
+    round: Vec<Stage>,
     bounds: Bounds,
-    /// Scene-linear brightness of a field colour of 1.
-    grey: f32,
-    lenses: BTreeSet<LensKind>,
-    rays: u32,
+    /// Rounds that the last band of pixels took.
+    rounds: usize,
 }
 
 impl Renderer {
     /// A renderer of the field whose parameters `field` holds, for cameras with `lenses`.
     ///
     /// # Errors
-    /// When the adapter cannot hold a chunk or refuses a kernel.
+    /// When the adapter cannot hold a round or refuses a kernel.
     pub fn new(
         gpu: &Arc<Gpu>,
         plan: &Plan,
@@ -56,26 +58,27 @@ impl Renderer {
         bounds: &Bounds,
         lenses: &BTreeSet<LensKind>,
     ) -> Result<Self> {
-        let mut plan = chunk_plan(plan);
+        let mut plan = view_plan(plan);
         plan.needs.lenses.clone_from(lenses);
         let mut workspace = Workspace::default();
         for name in PARAMETERS {
             workspace.share(field, name);
         }
         workspace.allocate(gpu, &plan.viewing_demands())?;
-        let mut stages = vec![viewing::rays(gpu, &plan, &workspace)?];
-        stages.extend(marching::stages(gpu, &plan, &workspace, false)?);
-        stages.extend(density::stages(gpu, &plan, &workspace)?);
-        stages.extend(color::stages(gpu, &plan, &workspace, color::Selection::All)?);
-        stages.push(viewing::composite(gpu, &plan, &workspace)?);
-        let (gpu, bounds, lenses) = (Arc::clone(gpu), bounds.clone(), lenses.clone());
-        Ok(Self { gpu, workspace, stages, bounds, grey: plan.needs.grey, lenses, rays: 1024 })
+        let refill = marching::scan(gpu, &plan, &workspace, marching::Scanned::Free)?;
+        let mut round = vec![viewing::rays(gpu, &plan, &workspace)?];
+        round.extend(marching::stages_over(gpu, &plan, &workspace, false, marching::Extent::Round)?);
+        round.extend(density::stages(gpu, &plan, &workspace)?);
+        round.extend(color::stages(gpu, &plan, &workspace, color::Selection::View)?);
+        round.push(viewing::composite(gpu, &plan, &workspace)?);
+        let (gpu, bounds) = (Arc::clone(gpu), bounds.clone());
+        Ok(Self { gpu, plan, workspace, refill, round, bounds, rounds: 1 })
     }
 
     /// Bytes on the device that a renderer of `plan` takes besides the parameters.
     #[must_use]
     pub fn bytes(plan: &Plan) -> u64 {
-        chunk_plan(plan).viewing_demands().iter().map(Demand::bytes).sum()
+        view_plan(plan).viewing_demands().iter().map(Demand::bytes).sum()
     }
 
     /// Renders what `camera` sees.
@@ -83,9 +86,9 @@ impl Renderer {
     /// # Errors
     /// When the device was lost, or the camera has a lens that was not linked.
     pub fn render(&mut self, camera: &Camera) -> Result<View> {
-        let kind = camera.lens.kind();
-        if !self.lenses.contains(&kind) {
-            let linked: Vec<_> = self.lenses.iter().map(|kind| kind.name()).collect();
+        let (kind, lenses) = (camera.lens.kind(), &self.plan.needs.lenses);
+        if !lenses.contains(&kind) {
+            let linked: Vec<_> = lenses.iter().map(|kind| kind.name()).collect();
             bail!(
                 "this renderer was built for the lenses {}, and the camera's is {}; name all lenses when building it",
                 linked.join(", "),
@@ -96,46 +99,73 @@ impl Renderer {
         let mut color = Vec::with_capacity(pixels);
         let mut depth = Vec::with_capacity(pixels);
         let camera_in_box = kernels::Camera::in_box(camera, &self.bounds);
-        self.gpu.write(self.workspace.get("cameras"), 0, &[camera_in_box]);
+        self.workspace.write(&self.gpu, "cameras", &[camera_in_box]);
         while color.len() < pixels {
-            let asked = (self.rays as usize).min(pixels - color.len());
-            let used = self.render_chunk(color.len(), asked)?;
-            color.extend(self.gpu.read::<[f32; 4]>(self.workspace.get("view_color"), 0, used)?);
-            depth.extend(self.gpu.read::<f32>(self.workspace.get("view_depth"), 0, used)?);
+            let band = self.plan.rounds.band.min(pixels - color.len());
+            self.render_band(color.len()..color.len() + band)?;
+            color.extend(self.workspace.read::<[f32; 4]>(&self.gpu, "view_color", band)?);
+            depth.extend(self.workspace.read::<f32>(&self.gpu, "view_depth", band)?);
         }
-        color.iter_mut().flat_map(|pixel| &mut pixel[..3]).for_each(|value| *value *= self.grey);
+        let grey = self.plan.needs.grey;
+        color.iter_mut().flat_map(|pixel| &mut pixel[..3]).for_each(|value| *value *= grey);
         let world_per_box = (self.bounds.outer_half() * 2.0) as f32;
         depth.iter_mut().for_each(|z| *z *= world_per_box);
         Ok(View { width: camera.width, height: camera.height, color, depth })
     }
 
-    /// Renders up to `rays` pixels from `first` on; returns how many fitted, at least one.
-    fn render_chunk(&mut self, first: usize, rays: usize) -> Result<usize> {
-        let counters = Counters { rays: rays as u32, ..Counters::default() };
-        self.gpu.write(self.workspace.get("counters"), 0, &[counters]);
-        let groups = [[rays.div_ceil(64) as u32, 1, 1, 0]];
-        self.gpu.write(self.workspace.get("dispatch"), kernels::dispatch::RAYS, &groups);
-        let step = Step { first_pixel: first as u32, ..Step::default() };
-        self.gpu.write(self.workspace.get("step"), 0, &[step]);
-        self.gpu.run("view", &self.stages, None);
-        let counters = self.gpu.read::<Counters>(self.workspace.get("counters"), 0, 1)?[0];
-        let used = counters.rays_used as usize;
-        if used == 0 {
-            bail!(
-                "the device rendered none of {rays} rays: its driver does not run the kernels as it should"
-            );
+    /// Renders a band of pixels. As many rounds as the last band took are submitted before the device is asked whether
+    /// rays are left, and few more at a time after that.
+    fn render_band(&mut self, band: Range<usize>) -> Result<()> {
+        self.begin_band(&band);
+        let rays = self.plan.config.batch.rays;
+        // A ray has a sample or more in each of its rounds, and no slot stays free.
+        let most = (band.len() / rays + 1) * (self.plan.config.march.most_steps + 1);
+        let (mut submitted, mut more) = (0, self.rounds);
+        loop {
+            for begun in (0..more).step_by(MOST_ROUNDS) {
+                let stages = self.round.iter().chain([&self.refill]);
+                let rounds = repeat_n(stages, MOST_ROUNDS.min(more - begun)).flatten();
+                self.gpu.run("rounds of a view", rounds, None);
+            }
+            submitted += more;
+            let progress = self.workspace.read::<Progress>(&self.gpu, "progress", 1)?[0];
+            if progress.rays == 0 && progress.rounds > 0 {
+                self.rounds = progress.rounds as usize;
+                return Ok(());
+            }
+            if submitted > most || progress.rounds == 0 {
+                bail!(
+                    "the device left {} of {} rays unfinished after {submitted} rounds: its driver does not run the \
+                     kernels as it should",
+                    progress.rays,
+                    band.len()
+                );
+            }
+            more = submitted.div_ceil(4);
         }
-        let fit = SAMPLES as f64 * 0.8 / f64::from(counters.samples_wanted.max(1)) * rays as f64;
-        self.rays = fit.clamp(64.0, RAYS as f64) as u32;
-        Ok(used)
+    }
+
+    /// Frees every slot, and gives each that is needed a pixel.
+    fn begin_band(&self, band: &Range<usize>) {
+        let Self { gpu, workspace, .. } = self;
+        let rays = self.plan.config.batch.rays.min(band.len()) as u32;
+        workspace.write(gpu, "counters", &[Counters { rays, ..Counters::default() }]);
+        workspace.write(gpu, "dispatch", &[[rays.div_ceil(64), 1, 1, 0]]);
+        let (begin, end) = (band.start as u32, band.end as u32);
+        let progress =
+            Progress { next_pixel: begin, band_begin: begin, band_end: end, ..Progress::default() };
+        workspace.write(gpu, "progress", &[progress]);
+        workspace.write(gpu, "view_slots", &vec![[0u32, 1]; rays as usize]);
+        gpu.run("first round of a view", [&self.refill], None);
     }
 }
 
-/// The plan of a renderer: every sample of a chunk gets colour.
-fn chunk_plan(plan: &Plan) -> Plan {
+/// The plan of a renderer, whose budget does not depend on the training's: every sample may get colour.
+fn view_plan(plan: &Plan) -> Plan {
     let mut plan = plan.clone();
-    plan.config.batch.samples = SAMPLES.max(plan.config.march.most_steps);
-    plan.config.batch.kept = plan.config.batch.samples;
-    plan.config.batch.rays = RAYS;
+    let batch = &mut plan.config.batch;
+    batch.rays = plan.rounds.rays;
+    batch.samples = plan.rounds.samples.max(plan.rounds.rays);
+    batch.kept = batch.samples;
     plan
 }

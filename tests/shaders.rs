@@ -14,7 +14,7 @@ use nerf::gpu::source::{Linked, Source};
 use nerf::gpu::tensor::Memory;
 use nerf::kernels::layer::Product;
 use nerf::kernels::training::Tile;
-use nerf::kernels::{Camera, Counters, Needs, Plan, Step, photos};
+use nerf::kernels::{Camera, Counters, Needs, Plan, Progress, Step, Traits, photos};
 use nerf::model::{Layout, Level};
 use wgpu::naga;
 
@@ -77,7 +77,13 @@ fn plan(memory: Memory, cascades: u32) -> Plan {
     let needs = Needs { alpha: true, cascades, cameras: 3, ..Needs::default() };
     let layout = Layout::new(&config, 2048);
     let product = Product { rows: 2, shared_weights: false };
-    Plan { config, layout, needs, product, accumulation: Accumulation::Exchange, memory, chunks: 32 }
+    let adapter = Traits { memory, ..Traits::GPU };
+    Plan {
+        product,
+        accumulation: Accumulation::Exchange,
+        chunks: 32,
+        ..Plan::suited_to(adapter, config, layout, needs)
+    }
 }
 
 /// Everything that was linked.
@@ -93,8 +99,8 @@ struct Linker {
 }
 
 /// The structs that Rust and WGSL share.
-const SHARED: [StructLayout; 5] =
-    [Step::LAYOUT, Counters::LAYOUT, Camera::LAYOUT, Level::LAYOUT, Tile::LAYOUT];
+const SHARED: [StructLayout; 6] =
+    [Step::LAYOUT, Counters::LAYOUT, Progress::LAYOUT, Camera::LAYOUT, Level::LAYOUT, Tile::LAYOUT];
 
 impl Linker {
     fn new(plan: Plan) -> Self {
@@ -221,6 +227,7 @@ fn variants_are_interchangeable() {
         "background",
         "depth_loss",
         "depth_target",
+        "extent",
         "loss",
         "pixels",
         "position",

@@ -3,8 +3,6 @@
 struct Step {
     // pcg(step + pcg(seed)): the start of this step's random numbers.
     stream: u32,
-    // Rays of a render chunk: the first pixel; unused while training.
-    first_pixel: u32,
     // Occupancy update: first cell, distance between cells and number of cells of this chunk.
     first_cell: u32,
     cell_stride: u32,

@@ -10,10 +10,11 @@ use super::Workbench;
 use super::draw::Random;
 use crate::camera::{Camera, Lens, LensKind};
 use crate::dataset::Bounds;
-use crate::kernels;
+use crate::kernels::{self, Progress};
 use anyhow::Result;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// A ray as the device stores it, in box space.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +62,15 @@ pub fn pixel_camera(origin: DVec3, direction: DVec3) -> kernels::Camera {
         center_px: [0.5; 2],
         ..kernels::Camera::default()
     }
+}
+
+/// Frees a slot for the ray of each of these pixels of a view.
+pub fn begin_rays(bench: &Workbench, pixels: Range<usize>) {
+    let free: Vec<[u32; 2]> = (0..pixels.len() as u32).map(|slot| [slot, 1]).collect();
+    let (first_pixel, next_pixel) = (pixels.start as u32, pixels.end as u32);
+    bench.write("view_slots", &free);
+    bench.write("progress", &[Progress { first_pixel, next_pixel, ..Progress::default() }]);
+    bench.set_rays(pixels.len());
 }
 
 fn bounds() -> Bounds {

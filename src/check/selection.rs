@@ -190,7 +190,7 @@ impl Chosen<'_> {
             for (got, want) in self.kept.iter().zip(&want) {
                 let delta = ray.samples[want.index].delta;
                 tally.value(got.delta.into(), delta, delta, || format!("{}: step", case()));
-                tally.value(got.gain.into(), want.gain, 1.0 + want.gain, || format!("{}: gain", case()));
+                tally.value(got.gains[0].into(), want.gain, 1.0 + want.gain, || format!("{}: gain", case()));
                 let gap: f64 = depths[behind..want.index].iter().sum();
                 let before: f64 = depths[..want.index].iter().sum();
                 tally.value(got.gap.into(), gap, 1.0 + before, || format!("{}: gap", case()));

@@ -209,7 +209,7 @@ impl TinyTraining {
     /// How many of the last step's kept samples stand for others too.
     fn representatives(&self) -> Result<usize> {
         let kept = self.bench.kept(self.bench.counters()?.kept as usize)?;
-        Ok(kept.iter().filter(|kept| kept.gain > 1.01).count())
+        Ok(kept.iter().filter(|kept| kept.gains[0] > 1.01).count())
     }
 
     /// The samples of the last step up to where each ray ends, its targets and backgrounds.
@@ -220,7 +220,7 @@ impl TinyTraining {
         let samples: Vec<[f32; 4]> = bench.read("samples", counters.samples as usize)?;
         let mut gains = vec![0.0; samples.len()];
         for kept in bench.kept(counters.kept as usize)? {
-            gains[kept.sample as usize] = f64::from(kept.gain);
+            gains[kept.sample as usize] = f64::from(kept.gains[0]);
         }
         let density = bench.density(samples.len())?;
         let spans: Vec<[u32; 2]> = bench.read("ray_spans", rays)?;

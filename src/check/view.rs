@@ -5,10 +5,12 @@ use super::marching::reference;
 use super::{Setup, Subject, Tally, Workbench};
 use crate::camera::{Camera, Lens, LensKind};
 use crate::dataset::Bounds;
+use crate::kernels::viewing::{LEAST_WEIGHT, Rounds};
+use crate::reference::Transmittance;
 use crate::reference::composite::{mean_depth, opacity, optical_depth, transmittances};
 use crate::reference::lens;
 use crate::reference::march::BoxRay;
-use crate::render::Renderer;
+use crate::render::{Renderer, View};
 use anyhow::Result;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -22,7 +24,12 @@ const SIZE: (u32, u32) = (11, 9);
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn rendered_views(subject: &Subject) -> Result<Tally> {
+pub fn rendered_views(subject: &Subject) -> Result<Vec<Tally>> {
+    let mut shared = Tally::new(
+        "rendered views: shared colours",
+        2e-3,
+        "a colour stands for that of samples whose weights sum to 0.001",
+    );
     let mut tally = Tally::new(
         "rendered views",
         2e-5,
@@ -30,25 +37,38 @@ pub fn rendered_views(subject: &Subject) -> Result<Tally> {
     );
     let lens = Lens::OpenCv { k: [-0.1, 0.02, 0.0, 0.0], p: [1e-3, -1e-3] };
     let fisheye = Lens::Fisheye { k: [-0.05, 0.01, 0.0, 0.0] };
+    let mut rounds = Tally::new("rendered views: rounds", 1e-6, "the same sums, however they are parted");
     let scenes = [
-        (1, false, Lens::Pinhole),
-        (3, true, lens),
-        (1, true, fisheye),
-        (3, false, Lens::Orthographic),
-        (1, false, Lens::Equirectangular),
+        (1, false, Lens::Pinhole, Transmittance::Exclusive),
+        (3, true, lens, Transmittance::Inclusive),
+        (1, true, fisheye, Transmittance::Exclusive),
+        (3, false, Lens::Orthographic, Transmittance::Exclusive),
+        (1, false, Lens::Equirectangular, Transmittance::Exclusive),
     ];
-    for (cascades, hdr, lens) in scenes {
-        let mut setup = Setup::tiny().network(32, 2).hdr(hdr);
+    for (number, (cascades, hdr, lens, transmittance)) in scenes.into_iter().enumerate() {
+        let mut setup = Setup::tiny().network(32, 2).hdr(hdr).transmittance(transmittance);
         setup.needs.cascades = cascades;
         setup.config.selection.stop_transmittance = STOP;
-        let bench = subject.workbench(setup)?;
+        let mut bench = subject.workbench(setup)?;
         bench.randomise(&mut Random::new(90), 2.0, 1.5)?;
         bench.write("occupancy_bits", &vec![u32::MAX; bench.plan.cell_count() / 32]);
         let bounds =
             Bounds { center: DVec3::new(1.0, 2.0, 3.0), half: 0.75, cascades, source: String::new() };
-        compare(&mut tally, &bench, &bounds, &camera(&bounds, lens))?;
+        let scene = Scene { camera: camera(&bounds, lens), bounds };
+        scene.compare(&mut shared, &bench)?;
+        bench.plan.rounds.color_weight = LEAST_WEIGHT;
+        let view = scene.compare(&mut tally, &bench)?;
+        if number < 2 {
+            scene.compare_rounds(&mut rounds, &mut bench, &view)?;
+        }
     }
-    Ok(tally)
+    Ok(vec![tally, shared, rounds])
+}
+
+/// What is seen, and from where.
+struct Scene {
+    bounds: Bounds,
+    camera: Camera,
 }
 
 fn camera(bounds: &Bounds, lens: Lens) -> Camera {
@@ -72,17 +92,46 @@ fn camera(bounds: &Bounds, lens: Lens) -> Camera {
     }
 }
 
-fn compare(tally: &mut Tally, bench: &Workbench, bounds: &Bounds, camera: &Camera) -> Result<()> {
-    // With cascades the lens is chosen among all, without it is the only one.
-    let lenses = if bounds.cascades > 1 { LensKind::ALL.into() } else { LensKind::among([camera]) };
-    let view = Renderer::new(&bench.gpu, &bench.plan, &bench.workspace, bounds, &lenses)?.render(camera)?;
-    let case = format!("{} cascades, {:?}", bounds.cascades, camera.lens);
-    let (colors, depths) = expected(bench, bounds, camera)?;
-    tally.holds((view.width, view.height) == SIZE, || format!("{case}: size"));
-    tally.each(&format!("{case}, colour"), view.color.as_flattened(), &colors, |i| 1.0 + colors[i].abs());
-    tally.each(&format!("{case}, depth"), &view.depth, &depths, |i| 1.0 + depths[i]);
-    tally.holds(depths.iter().any(|&z| z > 0.0), || format!("{case}: all is transparent"));
-    Ok(())
+impl Scene {
+    fn render(&self, bench: &Workbench) -> Result<View> {
+        let Self { bounds, camera } = self;
+        // With cascades the lens is chosen among all, without it is the only one.
+        let lenses = if bounds.cascades > 1 { LensKind::ALL.into() } else { LensKind::among([camera]) };
+        Renderer::new(&bench.gpu, &bench.plan, &bench.workspace, bounds, &lenses)?.render(camera)
+    }
+
+    fn name(&self) -> String {
+        format!("{} cascades, {:?}", self.bounds.cascades, self.camera.lens)
+    }
+
+    /// Compares with the reference.
+    fn compare(&self, tally: &mut Tally, bench: &Workbench) -> Result<View> {
+        let (view, case) = (self.render(bench)?, self.name());
+        let (colors, depths) = expected(bench, &self.bounds, &self.camera)?;
+        tally.holds((view.width, view.height) == SIZE, || format!("{case}: size"));
+        let size = |i: usize| 1.0 + colors[i].abs();
+        tally.each(&format!("{case}, colour"), view.color.as_flattened(), &colors, size);
+        tally.each(&format!("{case}, depth"), &view.depth, &depths, |i| 1.0 + depths[i]);
+        tally.holds(depths.iter().any(|&z| z > 0.0), || format!("{case}: all is transparent"));
+        Ok(view)
+    }
+
+    /// Rounds of one sample, of three, and of all that a ray has, in bands that end in the middle of a row.
+    fn compare_rounds(&self, tally: &mut Tally, bench: &mut Workbench, want: &View) -> Result<()> {
+        let ordinary = bench.plan.rounds;
+        let colors: Vec<f64> = want.color.as_flattened().iter().map(|&x| x.into()).collect();
+        let depths: Vec<f64> = want.depth.iter().map(|&z| z.into()).collect();
+        for (quota, rays, band) in [(1, 7, 50), (3, 64, 1000), (bench.plan.config.march.most_steps, 130, 98)]
+        {
+            bench.plan.rounds = Rounds { rays, samples: rays * quota, most_quota: quota, band, ..ordinary };
+            let (view, case) = (self.render(bench)?, format!("{}, rounds of {quota}", self.name()));
+            let size = |i: usize| 1.0 + colors[i].abs();
+            tally.each(&format!("{case}, colour"), view.color.as_flattened(), &colors, size);
+            tally.each(&format!("{case}, depth"), &view.depth, &depths, |i| 1.0 + depths[i]);
+        }
+        bench.plan.rounds = ordinary;
+        Ok(())
+    }
 }
 
 /// What the reference sees: colour and opacity `[pixels, 4]`, and depth.

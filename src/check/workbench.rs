@@ -42,8 +42,8 @@ pub struct Kept {
     pub delta: f32,
     /// Optical depth of what was left out in front of it.
     pub gap: f32,
-    /// How many times its own weight its colour has.
-    pub gain: f32,
+    /// How many times its own weight its colour has in both estimates.
+    pub gains: [f32; 2],
 }
 
 /// What one pass over a batch left on the device.
@@ -158,14 +158,16 @@ impl Workbench {
     pub fn kept(&self, count: usize) -> Result<Vec<Kept>> {
         let rows: Vec<[u32; 2]> = self.read("kept_rows", count)?;
         let steps: Vec<[f32; 4]> = self.read("kept_steps", count)?;
-        Ok((rows.into_iter().zip(steps))
-            .map(|([sample, ray], [s, delta, gap, gain])| Kept { sample, ray, s, delta, gap, gain })
+        let gains: Vec<[f32; 2]> = self.read("kept_gains", count)?;
+        Ok((rows.into_iter().zip(steps).zip(gains))
+            .map(|(([sample, ray], [s, delta, gap, _]), gains)| Kept { sample, ray, s, delta, gap, gains })
             .collect())
     }
 
     /// Log-densities and steps of the kept samples, as if all had been chosen.
     pub fn set_kept_steps(&self, steps: &[[f32; 2]]) {
-        self.write("kept_steps", &steps.iter().map(|&[s, delta]| [s, delta, 0.0, 1.0]).collect::<Vec<_>>());
+        self.write("kept_steps", &steps.iter().map(|&[s, delta]| [s, delta, 0.0, 0.0]).collect::<Vec<_>>());
+        self.write("kept_gains", &vec![[1.0_f32; 2]; steps.len()]);
     }
 
     /// Puts a batch on the device as if it had been drawn and marched.

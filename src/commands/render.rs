@@ -10,9 +10,12 @@ use nerf::dataset::{Bounds, read_cameras};
 use nerf::file::write_atomically;
 use nerf::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::picture::{ColorSpace, depth_srgb8, opaque_srgb8};
-use nerf::render::View;
+use nerf::render::{Renderer, View};
 use serde_json::{Map, Value, json};
 use std::io::Write;
+use std::panic::resume_unwind;
+use std::sync::mpsc;
+use std::thread;
 
 /// A camera to render, and where it comes from.
 struct Job {
@@ -42,12 +45,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     let depth_range = depth_range(&field.about.bounds, &jobs);
     let writer = Writer { args, color_space: field.color_space(), depth_range };
     let progress = Progress::new(session.remarks, "rendering");
-    let mut frames = Vec::with_capacity(jobs.len());
-    for (number, job) in jobs.iter().enumerate() {
-        let view = renderer.render(&job.camera)?;
-        frames.push(writer.write(job, &view)?);
-        progress.count(number + 1, jobs.len(), "frames");
-    }
+    let frames = render_and_write(&mut renderer, &jobs, &writer, &progress)?;
     drop(progress);
     let mut listing = json!({ "checkpoint": field.path.display().to_string(), "step": field.about.step });
     if args.depth {
@@ -61,6 +59,36 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     })?;
     let out = args.out.display().to_string();
     session.print(&json!({ "out": out, "frames": jobs.len() }), &format!("{} frames in {out}", jobs.len()))
+}
+
+/// Renders the jobs in order and describes their files. A thread writes those of one view while the next one renders.
+fn render_and_write(
+    renderer: &mut Renderer,
+    jobs: &[Job],
+    writer: &Writer<'_>,
+    progress: &Progress,
+) -> Result<Vec<Value>> {
+    thread::scope(|scope| {
+        // Without room in between: the next view waits until the last one is written.
+        let (sender, views) = mpsc::sync_channel::<(&Job, View)>(0);
+        let writing = scope.spawn(move || views.iter().map(|(job, view)| writer.write(job, &view)).collect());
+        let mut render = || -> Result<()> {
+            for (number, job) in jobs.iter().enumerate() {
+                let view = renderer.render(&job.camera)?;
+                // Nobody receives it where writing failed, which is reported below.
+                if sender.send((job, view)).is_err() {
+                    break;
+                }
+                progress.count(number + 1, jobs.len(), "frames");
+            }
+            Ok(())
+        };
+        let rendered = render();
+        drop(sender);
+        let written: Result<Vec<Value>> = writing.join().unwrap_or_else(|panic| resume_unwind(panic));
+        let frames = written?;
+        rendered.map(|()| frames)
+    })
 }
 
 fn jobs(args: &Render, field: &Field) -> Result<Vec<Job>> {

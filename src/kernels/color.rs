@@ -4,6 +4,7 @@ use super::density::{forward, layer_stage};
 use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
 use super::{
     COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, OCCUPANCY, Plan, RANDOM, STEP, Workspace, dispatch,
+    viewing,
 };
 use crate::config::Transmittance;
 use crate::gpu::Gpu;
@@ -21,8 +22,8 @@ pub const COLOR_HIDDEN: [&str; 4] = ["color_hidden_1", "color_hidden_2", "color_
 pub enum Selection {
     /// Those above the weight floor, and some of the others.
     Training,
-    /// All in front of the point where the ray is opaque.
-    All,
+    /// Of a view's rays, one for every [`super::viewing::Rounds::color_weight`].
+    View,
 }
 
 /// The kept samples and the colour network's activations.
@@ -33,6 +34,7 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
         Demand::storage::<f32>("ray_tails", plan.config.batch.rays),
         plan.tensor("kept_rows", Element::Pair, rows),
         plan.tensor("kept_steps", Element::Vec4, rows),
+        plan.tensor("kept_gains", Element::Vec2, rows),
         plan.tensor("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
         plan.tensor("color", Element::Vec4, rows),
     ];
@@ -45,35 +47,46 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
-    let floor = match selection {
-        // Its weights are no shares of one whole, so that none can stand for others.
-        Selection::Training if plan.config.transmittance == Transmittance::Inclusive => 0.0,
-        Selection::Training => plan.config.selection.weight_floor as f32,
-        // Whatever is lighter does not show in 32 bits.
-        Selection::All => 1e-12,
+    let [select, kept] = match selection {
+        Selection::Training => training_selection(gpu, plan, workspace)?,
+        Selection::View => [viewing::select(gpu, plan, workspace)?, viewing::kept(gpu, plan, workspace)?],
     };
-    let refresh = match selection {
-        Selection::Training => part!("refresh/marched.wgsl"),
-        Selection::All => part!("refresh/none.wgsl"),
+    let input = plan.kernel(gpu, "color input", &[COUNTERS, HARMONICS, part!("color_input.wgsl")])?;
+    let input = Stage::indirect(workspace.bind(gpu, &input, &[])?, workspace.get("dispatch"), dispatch::KEPT);
+    let mut stages = vec![select, scan(gpu, plan, workspace, Scanned::Kept)?, kept, input];
+    stages.extend(network(gpu, plan, workspace)?);
+    Ok(stages)
+}
+
+/// The kernels that choose and pack the samples of a training.
+fn training_selection(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<[Stage; 2]> {
+    // Inclusive weights are no shares of one whole, so that none can stand for others.
+    let floor = match plan.config.transmittance {
+        Transmittance::Inclusive => 0.0,
+        Transmittance::Exclusive => plan.config.selection.weight_floor as f32,
     };
     let select = plan.generated_kernel(
         gpu,
         "select",
-        &[RANDOM, STEP, COUNTERS, EXP, DENSITY, OCCUPANCY, refresh, part!("select.wgsl")],
+        &[
+            RANDOM,
+            STEP,
+            COUNTERS,
+            EXP,
+            DENSITY,
+            OCCUPANCY,
+            part!("refresh/marched.wgsl"),
+            part!("select.wgsl"),
+        ],
         &[],
         format!("const WEIGHT_FLOOR = f32({floor:?});"),
     )?;
     let kept = plan.kernel(gpu, "kept", &[COUNTERS, DENSITY, part!("kept.wgsl")])?;
-    let input = plan.kernel(gpu, "color input", &[COUNTERS, HARMONICS, part!("color_input.wgsl")])?;
-    let sizes = workspace.get("dispatch");
-    let mut stages = vec![
-        Stage::indirect(workspace.bind(gpu, &select, &[])?, sizes, dispatch::RAYS),
-        scan(gpu, plan, workspace, Scanned::Kept)?,
-        Stage::indirect(workspace.bind(gpu, &kept, &[])?, sizes, dispatch::RAYS),
-        Stage::indirect(workspace.bind(gpu, &input, &[])?, sizes, dispatch::KEPT),
-    ];
-    stages.extend(network(gpu, plan, workspace)?);
-    Ok(stages)
+    let over_rays = |kernel| -> Result<Stage> {
+        let sizes = workspace.get("dispatch");
+        Ok(Stage::indirect(workspace.bind(gpu, kernel, &[])?, sizes, dispatch::RAYS))
+    };
+    Ok([over_rays(&select)?, over_rays(&kept)?])
 }
 
 /// The colour network's layers.

@@ -1,7 +1,8 @@
 //! From rays to samples: marching through the occupancy grid, and the scan that packs the samples.
 
 use super::{
-    COUNTERS, Counters, MARCH_START, OCCUPANCY, Plan, RANDOM, RAY, RAY_LOAD, STEP, Step, Workspace, dispatch,
+    COUNTERS, Counters, MARCH_START, OCCUPANCY, PROGRESS, Part, Plan, RANDOM, RAY, RAY_LOAD, STEP, Step,
+    Workspace, dispatch,
 };
 use crate::config::Batch;
 use crate::gpu::Gpu;
@@ -29,34 +30,53 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     ]
 }
 
-/// Marches the rays and writes their samples; `jitter` shifts each ray's samples at random.
+/// How far rays are marched at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// To the end of the box.
+    Whole,
+    /// From where the round before ended, up to as many samples as the round allows: `ray_rounds` holds the first step
+    /// of each ray in this round and the first of the next, [`super::Progress::quota`] the most samples of a ray.
+    Round,
+}
+
+impl Extent {
+    fn parts(self) -> &'static [Part] {
+        const WHOLE: &[Part] = &[part!("extent/whole.wgsl")];
+        const ROUND: &[Part] = &[PROGRESS, part!("extent/round.wgsl")];
+        match self {
+            Self::Whole => WHOLE,
+            Self::Round => ROUND,
+        }
+    }
+}
+
+/// Marches the rays to their ends and writes their samples; `jitter` shifts each ray's samples at random.
 ///
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, jitter: bool) -> Result<Vec<Stage>> {
+    stages_over(gpu, plan, workspace, jitter, Extent::Whole)
+}
+
+/// As [`stages`], over an extent of the rays.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn stages_over(
+    gpu: &Gpu,
+    plan: &Plan,
+    workspace: &Workspace,
+    jitter: bool,
+    extent: Extent,
+) -> Result<Vec<Stage>> {
     let jitter = if jitter { part!("common/jitter_on.wgsl") } else { part!("common/jitter_off.wgsl") };
-    let stepping = plan.stepping();
-    let march = plan.kernel(
-        gpu,
-        "march",
-        &[
-            RANDOM,
-            STEP,
-            COUNTERS,
-            RAY,
-            RAY_LOAD,
-            OCCUPANCY,
-            stepping,
-            MARCH_START,
-            jitter,
-            part!("march.wgsl"),
-        ],
-    )?;
-    let samples = plan.kernel(
-        gpu,
-        "samples",
-        &[RANDOM, STEP, COUNTERS, RAY, RAY_LOAD, stepping, MARCH_START, jitter, part!("samples.wgsl")],
-    )?;
+    let common =
+        [&[RANDOM, STEP, COUNTERS, RAY, RAY_LOAD, plan.stepping(), MARCH_START, jitter], extent.parts()];
+    let march = [&[OCCUPANCY], common.concat().as_slice(), &[part!("march.wgsl")]].concat();
+    let march = plan.kernel(gpu, "march", &march)?;
+    let samples = [common.concat().as_slice(), &[part!("samples.wgsl")]].concat();
+    let samples = plan.kernel(gpu, "samples", &samples)?;
     let sizes = workspace.get("dispatch");
     Ok(vec![
         Stage::indirect(workspace.bind(gpu, &march, &[])?, sizes, dispatch::RAYS),
@@ -72,6 +92,8 @@ pub enum Scanned {
     Samples,
     /// The kept samples.
     Kept,
+    /// The slots of a view's rays that are free.
+    Free,
 }
 
 /// The scan over the rays' counts.
@@ -80,11 +102,15 @@ pub enum Scanned {
 /// When the kernel cannot be built.
 pub fn scan(gpu: &Gpu, plan: &Plan, workspace: &Workspace, scanned: Scanned) -> Result<Stage> {
     let batch = &plan.config.batch;
-    let (label, part, capacity, spans) = match scanned {
+    let (label, variant, capacity, spans) = match scanned {
         Scanned::Samples => ("scan samples", part!("common/scan_samples.wgsl"), batch.samples, "ray_spans"),
         Scanned::Kept => ("scan kept", part!("common/scan_kept.wgsl"), kept_capacity(batch), "kept_spans"),
+        Scanned::Free => ("scan free", part!("common/scan_free.wgsl"), batch.rays, "view_slots"),
     };
-    let parts = [COUNTERS, part, part!("scan.wgsl")];
+    let mut parts = vec![COUNTERS, variant, part!("scan.wgsl")];
+    if scanned == Scanned::Free {
+        parts.push(PROGRESS);
+    }
     let kernel = plan.generated_kernel(gpu, label, &parts, &[("CAPACITY", capacity)], String::new())?;
     Ok(Stage::fixed(workspace.bind(gpu, &kernel, &[("ray_spans", spans)])?, 1, 1))
 }

@@ -11,8 +11,6 @@ gpu_struct! {
     Step {
         /// Start of this step's random numbers.
         stream: u32,
-        /// First pixel of a chunk of a view.
-        first_pixel: u32,
         /// First cell of an occupancy chunk.
         first_cell: u32,
         /// Distance between its cells.
@@ -73,6 +71,26 @@ gpu_struct! {
         sum_loss: f32,
         /// Sum of their mean squared colour errors.
         sum_color_error: f32,
+    }
+}
+
+gpu_struct! {
+    /// How far the rendering of a view's band of pixels is; see `shaders/common/progress.wgsl`.
+    Progress {
+        /// Most samples of a ray in this round.
+        quota: u32,
+        /// Rays in work.
+        rays: u32,
+        /// Rounds begun.
+        rounds: u32,
+        /// First pixel among the rays that begin in this round.
+        first_pixel: u32,
+        /// First pixel among those of the next.
+        next_pixel: u32,
+        /// First pixel of the band.
+        band_begin: u32,
+        /// The pixel behind its last.
+        band_end: u32,
     }
 }
 

@@ -1,38 +1,103 @@
-//! What only rendering needs: a view's rays and its compositing.
+//! What only rendering needs: how much of a view is in work at once, its rays and their compositing.
 
-use super::{CAMERA, COUNTERS, Camera, EXP, Plan, RAY, RAY_STORE, STEP, SUM, Workspace, dispatch};
+use super::{
+    CAMERA, COUNTERS, Camera, DENSITY, EXP, Needs, PROGRESS, Part, Plan, Progress, RAY, RAY_STORE, SUM,
+    Traits, Workspace, dispatch,
+};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
+use crate::gpu::tensor::Element;
 use anyhow::Result;
 
-/// The camera and the results.
+/// How much of a view is in work at once. Rays are marched front to back in rounds of a few samples; one that ended
+/// makes room for the next pixel's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rounds {
+    /// Rays in work.
+    pub rays: usize,
+    /// Samples of a round, at least one for each ray; fewer rays may ask for more each.
+    pub samples: usize,
+    /// Most samples of a ray in a round: those behind an opaque surface are computed in vain.
+    pub most_quota: usize,
+    /// Most pixels between two read-backs.
+    pub band: usize,
+    /// Samples get colour wherever the weights since the last one sum to this, and stand for those in between.
+    pub color_weight: f64,
+}
+
+/// What does not show in 32 bits.
+pub const LEAST_WEIGHT: f64 = 1e-12;
+
+impl Rounds {
+    /// What suits an adapter: few samples in vain on a CPU, few rounds on a GPU.
+    pub(super) fn suited_to(adapter: Traits) -> Self {
+        if adapter.is_cpu {
+            Self { rays: 1 << 13, samples: 1 << 15, most_quota: 16, band: 1 << 20, color_weight: 1e-3 }
+        } else {
+            Self { rays: 1 << 15, samples: 1 << 18, most_quota: 64, band: 1 << 22, color_weight: 1e-3 }
+        }
+    }
+
+    /// The weight of a colour. Without a bound on the colours there is none on the error of one that stands for
+    /// others: in linear light every sample has its own.
+    pub(super) fn color_weight(&self, needs: &Needs) -> f64 {
+        if needs.hdr { LEAST_WEIGHT } else { self.color_weight }
+    }
+}
+
+/// The camera, the state of the rays and the pixels of a band.
 #[must_use]
 pub fn demands(plan: &Plan) -> Vec<Demand> {
-    let rays = plan.config.batch.rays;
+    let (rays, band) = (plan.config.batch.rays, plan.rounds.band);
     vec![
         Demand::storage::<Camera>("cameras", 1),
-        Demand::storage::<[f32; 4]>("view_color", rays),
-        Demand::storage::<f32>("view_depth", rays),
+        Demand::storage::<Progress>("progress", 1),
+        Demand::storage::<[u32; 2]>("view_slots", rays),
+        Demand::storage::<[u32; 2]>("ray_rounds", rays),
+        plan.tensor("view_pixels", Element::Word, rays),
+        plan.tensor("ray_states", Element::Vec4, rays),
+        plan.tensor("ray_colors", Element::Vec4, rays),
+        Demand::storage::<[f32; 4]>("view_color", band),
+        Demand::storage::<f32>("view_depth", band),
     ]
 }
 
-/// The rays of a chunk of pixels.
+/// Begins rays where slots are free.
 ///
 /// # Errors
 /// When the kernel cannot be built.
 pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [STEP, COUNTERS, RAY, RAY_STORE, CAMERA, part!("view_rays.wgsl")];
-    let kernel = plan.kernel(gpu, "view rays", &parts)?;
-    Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
+    let parts = [COUNTERS, PROGRESS, RAY, RAY_STORE, CAMERA, part!("view_rays.wgsl")];
+    stage(gpu, plan, workspace, "view rays", &parts)
 }
 
-/// Colour, opacity and depth of the rays.
+/// Chooses the samples that get colour.
+///
+/// # Errors
+/// When the kernel cannot be built.
+pub(super) fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
+    let parts = [COUNTERS, RAY, CAMERA, EXP, DENSITY, plan.transmittance(), SUM, part!("view_select.wgsl")];
+    stage(gpu, plan, workspace, "view select", &parts)
+}
+
+/// Packs them.
+///
+/// # Errors
+/// When the kernel cannot be built.
+pub(super) fn kept(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
+    stage(gpu, plan, workspace, "view kept", &[COUNTERS, part!("view_kept.wgsl")])
+}
+
+/// Adds their colours, and writes the pixels of rays that ended.
 ///
 /// # Errors
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [COUNTERS, RAY, CAMERA, EXP, SUM, plan.transmittance(), part!("view_composite.wgsl")];
-    let kernel = plan.kernel(gpu, "view composite", &parts)?;
+    stage(gpu, plan, workspace, "view composite", &[COUNTERS, PROGRESS, part!("view_composite.wgsl")])
+}
+
+fn stage(gpu: &Gpu, plan: &Plan, workspace: &Workspace, label: &str, parts: &[Part]) -> Result<Stage> {
+    let kernel = plan.kernel(gpu, label, parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
 }

@@ -4,7 +4,7 @@ use anyhow::Result;
 use glam::{DAffine3, DVec2, DVec3};
 use nerf::camera::{Camera, Lens, LensKind};
 use nerf::check::Setup;
-use nerf::check::rays::{DeviceRay, pixel_camera};
+use nerf::check::rays::{DeviceRay, begin_rays, pixel_camera};
 use nerf::dataset::Bounds;
 use nerf::kernels::viewing;
 use nerf::render::Renderer;
@@ -52,7 +52,7 @@ fn rays_along_the_axes() -> Result<()> {
     ] {
         let camera = pixel_camera(DVec3::from_array(origin), -DVec3::from_array(back));
         bench.write("cameras", &[camera]);
-        bench.set_rays(1);
+        begin_rays(&bench, 0..1);
         bench.run([&stage])?;
         let ray = &DeviceRay::read(&bench, 1)?[0];
         match want {

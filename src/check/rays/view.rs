@@ -1,11 +1,11 @@
 //! Rays of a view, through every lens.
 
-use super::{DeviceRay, bounds, camera, is_close_to_a_fold};
+use super::{DeviceRay, begin_rays, bounds, camera, is_close_to_a_fold};
 use crate::camera::{Camera, Lens, LensKind};
-use crate::check::draw::{Random, quiet_step};
+use crate::check::draw::Random;
 use crate::check::{Setup, Subject, Tally, Workbench};
 use crate::gpu::pass::Stage;
-use crate::kernels::{self, Step, viewing};
+use crate::kernels::{self, viewing};
 use crate::reference::lens::{self, LensRay};
 use crate::reference::march::{BoxRay, box_interval};
 use anyhow::Result;
@@ -220,8 +220,7 @@ impl<'a> View<'a> {
     fn draw(&self, first: usize, count: usize) -> Result<Vec<DeviceRay>> {
         let Bench { bench, stage } = self.bench;
         bench.write("cameras", &[kernels::Camera::in_box(&self.camera, &bounds())]);
-        bench.set_rays(count);
-        bench.set_step(Step { first_pixel: first as u32, ..quiet_step() });
+        begin_rays(bench, first..first + count);
         bench.run([stage])?;
         DeviceRay::read(bench, count)
     }

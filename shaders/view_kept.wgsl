@@ -1,0 +1,21 @@
+// Writes the chosen samples of a view's rays one behind the other. Needs: counters.
+
+var<storage, read> counters: Counters;
+var<storage, read> ray_spans: array<vec2<u32>>;
+var<storage, read> kept_spans: array<vec2<u32>>;
+tensor<read> chosen: vec4<f32>;
+// Sample and ray.
+tensor<write> kept_rows: vec2<u32>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let index = id.x;
+    if index >= counters.rays_used {
+        return;
+    }
+    let first = ray_spans[index].x;
+    let span = kept_spans[index];
+    for (var i = 0u; i < span.y; i++) {
+        kept_rows_store(span.x + i, vec2(u32(chosen_load(first + i).x), index));
+    }
+}
