@@ -43,10 +43,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var distance = depth_begin(index);
     var spread = spread_begin(index);
     for (var i = span.x; i < end; i++) {
-        let step = kept_steps_load(i);
+        let kept = kept_steps_load(i);
         let gains = kept_gains_load(i);
-        depth = sum_add(depth, vec4(step.z), zero);
-        let tau = optical_depth(step.x, step.y);
+        depth = sum_add(depth, vec4(kept.z), zero);
+        let tau = optical_depth(kept.x, kept.y);
         let root = exp_accurate(-0.5 * transmittance_depth(depth.value.x, tau));
         let alpha = opacity(tau);
         let own = vec4(color_load(i).rgb, 1.0);

@@ -341,8 +341,6 @@ impl Plan {
             ("RELATIVE_DARKEST", RELATIVE_DARKEST),
             ("DEPTH_WEIGHT", config.loss.depth),
             ("DISTORTION", config.loss.distortion),
-            ("OPACITY_WEIGHT", std::env::var("X_OPACITY").map_or(1.0, |v| v.parse().unwrap())),
-            ("DENSITY_OFFSET", std::env::var("X_OFFSET").map_or(0.0, |v| v.parse().unwrap())),
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         let background = config.background.solid().map(|value| value / self.needs.grey);

@@ -2,5 +2,5 @@
 
 // Weights of the squared errors of colour and opacity.
 fn loss_weight(rendered: vec4<f32>, wanted: vec4<f32>) -> vec4<f32> {
-    return vec4(1.0, 1.0, 1.0, OPACITY_WEIGHT);
+    return vec4(1.0);
 }

@@ -56,6 +56,8 @@ impl Field {
             workspace.write(gpu, name, values);
         }
         workspace.write(gpu, "occupancy_bits", &self.occupancy_bits);
-        Renderer::new(gpu, &plan, &workspace, bounds, lenses)
+        let mut renderer = Renderer::new(gpu, &plan, &workspace, bounds, lenses)?;
+        renderer.step_excess = self.about.step_excess;
+        Ok(renderer)
     }
 }

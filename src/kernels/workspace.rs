@@ -70,8 +70,13 @@ impl Workspace {
     /// When there is none: names are fixed in this module and its children.
     #[must_use]
     pub fn get(&self, name: &str) -> &Buffer {
-        let found = self.buffers.iter().find(|buffer| buffer.name == name);
-        found.unwrap_or_else(|| unreachable!("no buffer named '{name}'"))
+        self.find(name).unwrap_or_else(|| unreachable!("no buffer named '{name}'"))
+    }
+
+    /// The buffer `name`, if there is one.
+    #[must_use]
+    pub fn find(&self, name: &str) -> Option<&Buffer> {
+        self.buffers.iter().find(|buffer| buffer.name == name)
     }
 
     /// The tensor `name`.
