@@ -269,11 +269,11 @@ fn samples_that_are_left_out_have_no_gradient() {
     assert!(none.gradients.table.iter().all(|&d| d == 0.0));
     assert_eq!((one.loss, &one.gradients), (other.loss, &other.gradients));
     assert!(one.gradients != both.gradients);
-    for ray in 0..rays.len() {
+    for (number, ray) in rays.iter().enumerate() {
         for x in 0..4 {
-            let error = |batch: &BatchOutput| batch.rendered[ray][x] - rays[ray].target[x];
-            assert!((both.loss_terms[ray][x] - error(&both).powi(2)).abs() < 1e-12);
-            assert!((one.loss_terms[ray][x] - error(&both) * error(&none)).abs() < 1e-12);
+            let error = |batch: &BatchOutput| batch.rendered[number][x] - ray.target[x];
+            assert!((both.loss_terms[number][x] - error(&both).powi(2)).abs() < 1e-12);
+            assert!((one.loss_terms[number][x] - error(&both) * error(&none)).abs() < 1e-12);
         }
     }
 }
