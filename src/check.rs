@@ -29,6 +29,7 @@ mod setup;
 pub mod step;
 mod subject;
 mod tally;
+mod thinned;
 pub mod view;
 mod workbench;
 
@@ -60,10 +61,7 @@ const CHECKS: [Check; 17] = [
     Check { name: "activations", run: |subject| Ok(vec![activation::activations(subject)?]) },
     Check { name: "networks and scatter", run: |subject| networks::networks(subject, &networks::SHAPES) },
     Check { name: "render, loss and gradient", run: fused::fused },
-    Check {
-        name: "depth and relative errors",
-        run: |subject| Ok(vec![loss::depth_and_relative_errors(subject)?]),
-    },
+    Check { name: "further terms of the loss", run: loss::further_terms },
     Check { name: "Adam", run: adam::adam },
     Check { name: "occupancy", run: |subject| Ok(vec![occupancy::occupancy_update(subject)?]) },
     Check { name: "whole steps and views", run: whole },

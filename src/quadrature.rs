@@ -192,7 +192,7 @@ impl Samples {
     pub fn render(&self, convention: Transmittance, stop: f64) -> [f64; 4] {
         let delta = vec![self.delta; self.s.len()];
         let all = Selection { stop_transmittance: stop, floor: 0.0, light_share: 1.0 };
-        let kept = select(&all, &self.s, &delta, |_| Luck { member: 0.0, light: 0.0 }).1;
+        let kept = select(&all, &self.s, &delta, |_| Luck { member: [0.0; 2], light: [0.0; 2] }).1;
         let ray = CompositeInput {
             s: &self.s[..kept],
             delta: &delta[..kept],

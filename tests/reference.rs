@@ -6,7 +6,7 @@ use nerf::reference::composite::{CompositeInput, CompositeOutput, composite};
 use nerf::reference::grid::{FEATURES, grid_encode, grid_encode_backward, levels, table_entries};
 use nerf::reference::loss::Loss;
 use nerf::reference::mlp::Mlp;
-use nerf::reference::model::{Model, Objective, RaySample, TrainingRay};
+use nerf::reference::model::{BatchOutput, Model, Objective, RaySample, TrainingRay};
 use nerf::reference::random::{random_u32, uniform};
 use nerf::reference::step::Training;
 use nerf::reference::{ColorRange, Transmittance};
@@ -207,7 +207,7 @@ fn tiny_batch(random: &mut Random, rays: usize) -> Vec<TrainingRay> {
     let sample = |random: &mut Random| RaySample {
         position: DVec3::from_array(random.triple(0.0, 1.0)),
         delta: random.number(0.05, 0.5),
-        gain: 1.0,
+        gains: [1.0; 2],
         distance: random.number(0.0, 2.0),
     };
     (0..rays)
@@ -228,7 +228,7 @@ fn whole_step_gradients_are_slopes() {
     let rays = tiny_batch(&mut random, 5);
     for transmittance in CONVENTIONS {
         for color_range in [ColorRange::Ldr, ColorRange::Hdr] {
-            let loss = Loss { is_relative: false, depth: 0.3 };
+            let loss = Loss { depth: 0.3, distortion: 0.2, ..Loss::default() };
             let objective = Objective { transmittance, color_range, loss };
             let gradients = model.forward_backward(objective, &rays).gradients;
             let by_table = |table: &[f64]| {
@@ -254,24 +254,27 @@ fn whole_step_gradients_are_slopes() {
     }
 }
 
-/// With a gain of 0 the gradient misses exactly what reaches the log-density; with 2 it has it twice.
+/// Samples in no estimate only absorb; those in one of them have no squared error, but that of the other.
 #[test]
-fn gain_multiplies_the_density_gradient_only() {
+fn samples_that_are_left_out_have_no_gradient() {
     let mut random = Random::new(6);
     let model = tiny_model(&mut random);
     let mut rays = tiny_batch(&mut random, 5);
-    let [none, once, twice] = [0.0, 1.0, 2.0].map(|gain| {
+    let [none, one, other, both] = [[0.0; 2], [1.0, 0.0], [0.0, 1.0], [1.0; 2]].map(|gains| {
         for sample in rays.iter_mut().flat_map(|ray| &mut ray.samples) {
-            sample.gain = gain;
+            sample.gains = gains;
         }
         model.forward_backward(Objective::default(), &rays)
     });
-    assert_eq!(none.loss, twice.loss);
-    assert_eq!(none.gradients.color, twice.gradients.color);
-    let density = [none, once, twice].map(|batch| batch.gradients.density.concat());
-    assert!(density[0] != density[1]);
-    for ((none, once), twice) in density[0].iter().zip(&density[1]).zip(&density[2]) {
-        assert!((twice - 2.0 * once + none).abs() < 1e-12);
+    assert!(none.gradients.table.iter().all(|&d| d == 0.0));
+    assert_eq!((one.loss, &one.gradients), (other.loss, &other.gradients));
+    assert!(one.gradients != both.gradients);
+    for (number, ray) in rays.iter().enumerate() {
+        for x in 0..4 {
+            let error = |batch: &BatchOutput| batch.rendered[number][x] - ray.target[x];
+            assert!((both.loss_terms[number][x] - error(&both).powi(2)).abs() < 1e-12);
+            assert!((one.loss_terms[number][x] - error(&both) * error(&none)).abs() < 1e-12);
+        }
     }
 }
 

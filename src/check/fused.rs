@@ -2,6 +2,7 @@
 
 use super::draw::Random;
 use super::hard_rays::HardRay;
+use super::thinned::thinned_rays;
 use super::{Setup, Subject, Tally, Workbench};
 use crate::gpu::pass::Stage;
 use crate::kernels::{Counters, training};
@@ -14,7 +15,7 @@ use anyhow::{Context, Result};
 pub const BOUND: f64 = 5e-5;
 
 /// Samples and rays of one run of the kernel; a longer ray gets a larger workbench.
-const SAMPLES: usize = 1 << 14;
+pub(super) const SAMPLES: usize = 1 << 14;
 const RAYS: usize = 1 << 12;
 /// Samples of the longest ray that can be marched: so many that plain sums would be wrong.
 const LONGEST: usize = 1 << 14;
@@ -24,7 +25,8 @@ const GROUP: usize = 64;
 /// The fused kernel, without an early stop.
 #[derive(Debug)]
 pub struct Fused {
-    bench: Workbench,
+    /// The buffers.
+    pub(super) bench: Workbench,
     stage: Stage,
     /// Samples of one run.
     samples: usize,
@@ -70,8 +72,17 @@ impl Fused {
     }
 
     fn run_once(&self, rays: &[CompositeInput<'_>]) -> Result<Vec<CompositeOutput>> {
-        let bench = &self.bench;
         let spans = self.upload(rays);
+        self.outputs(rays, &spans)
+    }
+
+    /// Runs the kernel on what was uploaded.
+    pub(super) fn outputs(
+        &self,
+        rays: &[CompositeInput<'_>],
+        spans: &[[u32; 2]],
+    ) -> Result<Vec<CompositeOutput>> {
+        let bench = &self.bench;
         bench.run([&self.stage])?;
         let samples = rays.iter().map(|ray| ray.s.len()).sum();
         let rendered: Vec<[f32; 4]> = bench.read("rendered", rays.len())?;
@@ -98,7 +109,7 @@ impl Fused {
     }
 
     /// Writes the rays as if their samples had been chosen and coloured; returns first sample and number of each.
-    fn upload(&self, rays: &[CompositeInput<'_>]) -> Vec<[u32; 2]> {
+    pub(super) fn upload(&self, rays: &[CompositeInput<'_>]) -> Vec<[u32; 2]> {
         let (mut spans, mut steps, mut colors) = (Vec::new(), Vec::new(), Vec::new());
         for ray in rays {
             spans.push([steps.len() as u32, ray.s.len() as u32]);
@@ -140,15 +151,16 @@ pub fn golden_rays(subject: &Subject, file: &GoldenFile) -> Result<Vec<RayError>
     Ok(file.rays.iter().zip(&outputs).map(|(ray, output)| RayError::new(&ray.expect, output)).collect())
 }
 
-/// Compositing, loss and gradients of hard rays, in both conventions.
+/// Compositing, loss and gradients of hard rays, in both conventions, and of thinned ones.
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
 pub fn fused(subject: &Subject) -> Result<Vec<Tally>> {
-    [Transmittance::Exclusive, Transmittance::Inclusive]
-        .map(|convention| of_convention(subject, convention))
-        .into_iter()
-        .collect()
+    Ok(vec![
+        of_convention(subject, Transmittance::Exclusive)?,
+        of_convention(subject, Transmittance::Inclusive)?,
+        thinned_rays(subject)?,
+    ])
 }
 
 fn of_convention(subject: &Subject, convention: Transmittance) -> Result<Tally> {

@@ -1,4 +1,4 @@
-//! The fused kernel with everything that a loss may have: errors relative to the colour, and depth.
+//! The fused kernel with everything that a loss may have: errors relative to the colour, depth, and the distortion.
 
 use super::draw::Random;
 use super::{Setup, Subject, Tally};
@@ -6,7 +6,8 @@ use crate::config::{ColorLoss, Loss};
 use crate::kernels::{Counters, training};
 use crate::reference::Transmittance;
 use crate::reference::composite::{CompositeInput, CompositeOutput, optical_depths};
-use crate::reference::loss::composite_with;
+use crate::reference::loss::{Places, composite_with, distortion};
+use crate::reference::model::Objective;
 use anyhow::Result;
 use std::iter::repeat_n;
 
@@ -25,39 +26,68 @@ struct Ray {
     background: [f64; 3],
 }
 
-/// Loss and gradients of rays of 0 to 60 samples, from transparent to opaque, in both conventions.
+/// A loss, and how far away samples are.
+struct Case {
+    name: &'static str,
+    loss: Loss,
+    /// Least and largest distance, in sides of the inner cube; even in their logarithm.
+    distances: [f64; 2],
+    bound: (f64, &'static str),
+}
+
+/// Loss and gradients of rays of 0 to 60 samples, from transparent to opaque, in both conventions. The distortion
+/// weighs as much as all else, which would otherwise hide its errors, and reaches over six decades of distance.
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
-pub fn depth_and_relative_errors(subject: &Subject) -> Result<Tally> {
-    let mut tally =
-        Tally::new("depth and relative errors", 2e-5, "T = e^-depth, and distances of up to 4 round");
-    for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
-        let mut setup = Setup::tiny().transmittance(convention);
-        setup.config.loss = Loss { color: ColorLoss::Relative, depth: 0.3, ..Loss::default() };
-        setup.needs.depth = true;
-        (setup.config.batch.kept, setup.config.batch.samples) = (8192, 8192);
-        let bench = subject.workbench(setup)?;
-        let mut random = Random::new(73);
-        let rays: Vec<_> = (0..200).map(|number| Ray::new(&mut random, number)).collect();
-        let mut first = 0;
-        let spans: Vec<[u32; 2]> = (rays.iter())
-            .map(|ray| {
-                let span = [first, ray.s.len() as u32];
-                first += span[1];
-                span
-            })
-            .collect();
-        upload(&bench, &rays, &spans);
-        bench.run([&training::composite(&bench.gpu, &bench.plan, &bench.workspace, true)?])?;
-        let gradients: Vec<[f32; 4]> = bench.read("d_color", first as usize)?;
-        let errors: Vec<[f32; 4]> = bench.read("ray_errors", rays.len())?;
-        for (number, (ray, [first, count])) in rays.iter().zip(spans).enumerate() {
-            let range = first as usize..(first + count) as usize;
-            ray.compare(&mut tally, &bench.objective(), &gradients[range], errors[number], number);
+pub fn further_terms(subject: &Subject) -> Result<Vec<Tally>> {
+    let cases = [
+        Case {
+            name: "depth and relative errors",
+            loss: Loss { color: ColorLoss::Relative, depth: 0.3, ..Loss::default() },
+            distances: [0.1, 4.0],
+            bound: (2e-5, "T = e^-depth, and distances of up to 4 round"),
+        },
+        Case {
+            name: "distortion",
+            loss: Loss { color: ColorLoss::Relative, distortion: 20.0, ..Loss::default() },
+            distances: [1e-3, 1e3],
+            bound: (2e-5, "T = e^-depth, and sums of weights round"),
+        },
+    ];
+    cases.iter().map(|case| case.run(subject)).collect()
+}
+
+impl Case {
+    fn run(&self, subject: &Subject) -> Result<Tally> {
+        let mut tally = Tally::new(self.name, self.bound.0, self.bound.1);
+        for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
+            let mut setup = Setup::tiny().transmittance(convention);
+            setup.config.loss = self.loss.clone();
+            setup.needs.depth = true;
+            (setup.config.batch.kept, setup.config.batch.samples) = (8192, 8192);
+            let bench = subject.workbench(setup)?;
+            let mut random = Random::new(73);
+            let rays: Vec<_> = (0..200).map(|number| Ray::new(&mut random, number, self.distances)).collect();
+            let mut first = 0;
+            let spans: Vec<[u32; 2]> = (rays.iter())
+                .map(|ray| {
+                    let span = [first, ray.s.len() as u32];
+                    first += span[1];
+                    span
+                })
+                .collect();
+            upload(&bench, &rays, &spans);
+            bench.run([&training::composite(&bench.gpu, &bench.plan, &bench.workspace, true)?])?;
+            let gradients: Vec<[f32; 4]> = bench.read("d_color", first as usize)?;
+            let errors: Vec<[f32; 4]> = bench.read("ray_errors", rays.len())?;
+            for (number, (ray, [first, count])) in rays.iter().zip(spans).enumerate() {
+                let range = first as usize..(first + count) as usize;
+                ray.compare(&mut tally, &bench.objective(), &gradients[range], errors[number], number);
+            }
         }
+        Ok(tally)
     }
-    Ok(tally)
 }
 
 fn upload(bench: &super::Workbench, rays: &[Ray], spans: &[[u32; 2]]) {
@@ -95,15 +125,21 @@ fn narrow(values: [f64; 4]) -> [f32; 4] {
 }
 
 impl Ray {
-    fn new(random: &mut Random, number: usize) -> Self {
+    /// Every fifth ray has all its samples at one distance.
+    fn new(random: &mut Random, number: usize, [nearest, farthest]: [f64; 2]) -> Self {
         let count = number * 7 % 61;
         let mut numbers = |low: f64, high: f64| -> Vec<f64> {
             random.numbers(count, low, high).into_iter().map(f64::from).collect()
         };
         let (s, delta) = (numbers(-6.0, 5.0), numbers(0.01, 0.2));
         let channels = [numbers(0.0, 20.0), numbers(0.0, 1.0), numbers(0.0, 0.05)];
-        let mut distances = numbers(0.1, 4.0);
+        let mut distances = numbers(nearest.ln(), farthest.ln());
         distances.sort_by(f64::total_cmp);
+        if number % 5 == 4 {
+            let first = distances.first().copied().unwrap_or_default();
+            distances.fill(first);
+        }
+        let distances = distances.into_iter().map(|ln| f64::from(ln.exp() as f32)).collect();
         let color = (0..count).map(|i| channels.each_ref().map(|channel| channel[i])).collect();
         let mut number_in = |low: f64, high: f64| f64::from(random.number(low, high) as f32);
         Self {
@@ -120,7 +156,7 @@ impl Ray {
     fn compare(
         &self,
         tally: &mut Tally,
-        objective: &crate::reference::model::Objective,
+        objective: &Objective,
         gradients: &[[f32; 4]],
         errors: [f32; 4],
         number: usize,
@@ -133,12 +169,9 @@ impl Ray {
             background: self.background,
             rays_in_batch: 200,
         };
-        let offsets: Vec<f64> = match self.goal > 0.0 {
-            true => self.distances.iter().map(|t| t - self.goal).collect(),
-            false => Vec::new(),
-        };
-        let want = composite_with(objective.loss, objective.transmittance, &input, &offsets, &[]);
-        let scales = Scales::new(objective, &input, &want, &offsets);
+        let places = Places { distances: &self.distances, depth: self.goal };
+        let want = composite_with(objective.loss, objective.transmittance, &input, places, &[]);
+        let scales = Scales::new(objective, &input, &want, places);
         let case = |what: &str| format!("ray {number}, {what}");
         for (x, &error) in errors.iter().enumerate().take(3) {
             let weight = objective.loss.weights(want.rendered, self.target)[x];
@@ -165,31 +198,53 @@ struct Scales {
 
 impl Scales {
     fn new(
-        objective: &crate::reference::model::Objective,
+        objective: &Objective,
         ray: &CompositeInput<'_>,
         output: &CompositeOutput,
-        offsets: &[f64],
+        places: Places<'_>,
     ) -> Self {
         let m = f64::from(ray.rays_in_batch);
-        let weights = objective.loss.weights(output.rendered, ray.target);
+        let loss = objective.loss;
+        let v = loss.weights(output.rendered, ray.target);
         let both = |x: usize| output.rendered[x].abs() + ray.target[x].abs();
-        let residual: [f64; 4] = std::array::from_fn(|x| weights[x] * both(x) / (2.0 * m));
-        let size_of_depth: f64 = output.weights.iter().zip(offsets).map(|(w, offset)| w * offset.abs()).sum();
-        let share = objective.loss.depth / m;
-        let loss = (0..4).map(|x| residual[x] * both(x) / 2.0).sum::<f64>() + share * size_of_depth.powi(2);
+        let residual: [f64; 4] = std::array::from_fn(|x| v[x] * both(x) / (2.0 * m));
+        let offset = |t: &f64| if places.depth > 0.0 { (t - places.depth).abs() } else { 0.0 };
+        let offsets: Vec<f64> = places.distances.iter().map(offset).collect();
+        let depth: f64 = output.weights.iter().zip(&offsets).map(|(w, offset)| w * offset).sum();
+        let apart = SizeOfDistortion::new(ray, output, places);
+        let shares = [residual.as_slice(), &[2.0 * loss.depth / m * depth, loss.distortion / m]].concat();
+        let loss = (0..4).map(|x| residual[x] * both(x) / 2.0).sum::<f64>()
+            + (loss.depth * depth.powi(2) + loss.distortion * apart.sum) / m;
         let depths = optical_depths(ray);
-        let mut behind = [ray.background[0], ray.background[1], ray.background[2], 0.0, 0.0]
+        let mut behind = [ray.background[0], ray.background[1], ray.background[2], 0.0, 0.0, 0.0]
             .map(|background| output.transmittance_end * background);
         let mut d_s = vec![0.0; depths.len()];
         for i in (0..depths.len()).rev() {
             let [r, g, b] = ray.color[i];
-            let channels = [r, g, b, 1.0, offsets.get(i).copied().unwrap_or(0.0)];
+            let channels = [r, g, b, 1.0, offsets[i], apart.slopes[i]];
             let passing = (-depths[..=i].iter().sum::<f64>()).exp();
             let term = |x: usize| behind[x] + (passing + output.weights[i]) * channels[x].abs();
-            let by_color: f64 = (0..4).map(|x| residual[x] * term(x)).sum();
-            d_s[i] = depths[i] * (by_color + 2.0 * share * size_of_depth * term(4));
-            (0..5).for_each(|x| behind[x] += output.weights[i] * channels[x].abs());
+            d_s[i] = depths[i] * (0..6).map(|x| shares[x] * term(x)).sum::<f64>();
+            (0..6).for_each(|x| behind[x] += output.weights[i] * channels[x].abs());
         }
         Self { residual, loss, d_s }
+    }
+}
+
+/// The distortion and its slopes by the weights, with `x_i + x_j` in place of `|x_i − x_j|`.
+struct SizeOfDistortion {
+    sum: f64,
+    slopes: Vec<f64>,
+}
+
+impl SizeOfDistortion {
+    fn new(ray: &CompositeInput<'_>, output: &CompositeOutput, places: Places<'_>) -> Self {
+        let w = &output.weights;
+        let (sum, slopes) = distortion(w, places.distances, ray.delta);
+        let x: Vec<f64> = places.distances.iter().map(|t| t / (1.0 + t)).collect();
+        let all: f64 = w.iter().sum();
+        let all_x: f64 = w.iter().zip(&x).map(|(w, x)| w * x).sum();
+        let size = |i: usize| slopes[i] + 2.0 * (x[i] * all + all_x);
+        Self { sum: sum + 2.0 * all * all_x, slopes: (0..x.len()).map(size).collect() }
     }
 }

@@ -21,7 +21,7 @@ pub struct Selecting {
     stages: Vec<Stage>,
 }
 
-/// Chosen samples and what they stand for: of ordinary rays, of a fog in which most end, with a high floor, and all.
+/// Chosen samples and what they stand for in both estimates: of ordinary rays, of a fog in which most end, with a high floor, and all.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
@@ -135,13 +135,17 @@ impl Selecting {
         };
         let s: Vec<f64> = raw.iter().map(|&raw| log_density(f64::from(raw))).collect();
         let delta: Vec<f64> = ray.samples.iter().map(|sample| sample.delta).collect();
-        let luck = |index: usize, nudge: f64| Luck {
-            member: uniform(first + index, dimension::SELECTION) + nudge,
-            light: uniform(first + index, dimension::LIGHT) + nudge,
+        let luck = |index: usize, nudge: f64| {
+            let of = |first_dimension: u32| {
+                [0, 1].map(|estimate| uniform(first + index, first_dimension + estimate) + nudge)
+            };
+            Luck { member: of(dimension::SELECTION), light: of(dimension::LIGHT) }
         };
         let (want, _) = select(&selection, &s, &delta, |index| luck(index, 0.0));
         // A little more or less luck, or light, must not change the choice.
-        let indices = |kept: &[selection::Kept]| kept.iter().map(|kept| kept.index).collect::<Vec<_>>();
+        let indices = |kept: &[selection::Kept]| -> Vec<_> {
+            kept.iter().map(|kept| (kept.index, kept.gains.map(|gain| gain > 0.0))).collect()
+        };
         for nudge in [-1e-4, 1e-4] {
             let stop_transmittance = selection.stop_transmittance * (1.0 + nudge);
             let floor = selection.floor * (1.0 + nudge);
@@ -190,7 +194,8 @@ impl Chosen<'_> {
             for (got, want) in self.kept.iter().zip(&want) {
                 let delta = ray.samples[want.index].delta;
                 tally.value(got.delta.into(), delta, delta, || format!("{}: step", case()));
-                tally.value(got.gains[0].into(), want.gain, 1.0 + want.gain, || format!("{}: gain", case()));
+                let size = |estimate: usize| 1.0 + want.gains[estimate];
+                tally.each(&format!("{}: gains", case()), &got.gains, &want.gains, size);
                 let gap: f64 = depths[behind..want.index].iter().sum();
                 let before: f64 = depths[..want.index].iter().sum();
                 tally.value(got.gap.into(), gap, 1.0 + before, || format!("{}: gap", case()));

@@ -13,7 +13,7 @@ use crate::reference::Transmittance;
 use crate::reference::activation::log_density;
 use crate::reference::adam::Adam;
 use crate::reference::composite::optical_depth;
-use crate::reference::model::{BatchOutput, Model, Objective, RaySample, TrainingRay};
+use crate::reference::model::{BatchOutput, Model, RaySample, TrainingRay};
 use crate::reference::step::Training;
 use crate::train::{StepStats, Trainer};
 use crate::views::Views;
@@ -32,8 +32,8 @@ pub struct TinyTraining {
     pub bench: Workbench,
 }
 
-/// What is trained, by name: plain, over random backgrounds, in the inclusive convention, with linear light and a relative loss in cascades,
-/// and with masks, depth and 16 bits.
+/// What is trained, by name: plain, over random backgrounds, in the inclusive convention, with linear light and a
+/// relative loss in cascades, and with masks, depth, the distortion and 16 bits.
 #[must_use]
 pub fn setups() -> [(&'static str, Setup); 5] {
     let mut random_background = Setup::tiny().network(32, 2);
@@ -41,14 +41,14 @@ pub fn setups() -> [(&'static str, Setup); 5] {
     let mut cascades = Setup::tiny().network(32, 1).hdr(true);
     cascades.needs.cascades = 3;
     let mut masks = Setup::tiny();
-    masks.config.loss.depth = 0.3;
+    (masks.config.loss.depth, masks.config.loss.distortion) = (0.3, 0.02);
     (masks.needs.deep, masks.needs.masks, masks.needs.depth) = (true, true, true);
     [
         ("plain", Setup::tiny()),
         ("random background", random_background),
         ("inclusive", Setup::tiny().transmittance(Transmittance::Inclusive)),
         ("hdr, 3 cascades", cascades),
-        ("masks, depth, 16 bits", masks),
+        ("masks, depth, distortion, 16 bits", masks),
     ]
 }
 
@@ -66,7 +66,7 @@ pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
         let mut reference = tiny.reference()?;
         let before = reference.model.clone();
         let (stats, batch) = tiny.step()?;
-        let kept = |ray: &TrainingRay| ray.samples.iter().filter(|sample| sample.gain > 0.0).count();
+        let kept = |ray: &TrainingRay| ray.samples.iter().filter(|sample| sample.gains != [0.0; 2]).count();
         let samples: usize = batch.iter().map(kept).sum();
         let counted = [stats.steps, stats.skipped] == [1, 0]
             && stats.rays == batch.len() as u64
@@ -78,7 +78,7 @@ pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
         tally.holds(filled && thinned, || format!("{name}: a thin batch"));
         let want = reference.step(&batch, LEARNING_RATE);
         tally.value(stats.loss, want.loss, want.loss, || format!("{name}: loss"));
-        let error = color_error(&want, &batch, reference.objective);
+        let error = color_error(&want);
         tally.value(stats.color_error, error, error, || format!("{name}: colour error"));
         compare_rays(&mut tally, name, &tiny.bench)?;
         compare_moments(&mut tally, name, &tiny.bench, &reference)?;
@@ -88,13 +88,9 @@ pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
 }
 
 /// Mean squared error of red, green and blue, as they count.
-fn color_error(output: &BatchOutput, batch: &[TrainingRay], objective: Objective) -> f64 {
-    let squares = |(got, ray): (&[f64; 4], &TrainingRay)| {
-        let weights = objective.loss.weights(*got, ray.target);
-        (0..3).map(|x| weights[x] * (got[x] - ray.target[x]).powi(2)).sum::<f64>()
-    };
-    let sum: f64 = output.rendered.iter().zip(batch).map(squares).sum();
-    sum / (3.0 * batch.len() as f64)
+fn color_error(output: &BatchOutput) -> f64 {
+    let sum: f64 = output.loss_terms.iter().flat_map(|terms| &terms[..3]).sum();
+    sum / (3.0 * output.loss_terms.len() as f64)
 }
 
 /// The number of rays of the next step, which follows how many samples this one's rays had.
@@ -206,10 +202,10 @@ impl TinyTraining {
         Ok((self.trainer.report()?, self.batch()?))
     }
 
-    /// How many of the last step's kept samples stand for others too.
+    /// How many of the last step's kept samples stand for others too, in one estimate only.
     fn representatives(&self) -> Result<usize> {
         let kept = self.bench.kept(self.bench.counters()?.kept as usize)?;
-        Ok(kept.iter().filter(|kept| kept.gains[0] > 1.01).count())
+        Ok(kept.iter().filter(|kept| kept.gains[0] > 1.01 && kept.gains[1] == 0.0).count())
     }
 
     /// The samples of the last step up to where each ray ends, its targets and backgrounds.
@@ -218,9 +214,9 @@ impl TinyTraining {
         let counters = bench.counters()?;
         let rays = counters.rays_used as usize;
         let samples: Vec<[f32; 4]> = bench.read("samples", counters.samples as usize)?;
-        let mut gains = vec![0.0; samples.len()];
+        let mut gains = vec![[0.0; 2]; samples.len()];
         for kept in bench.kept(counters.kept as usize)? {
-            gains[kept.sample as usize] = f64::from(kept.gains[0]);
+            gains[kept.sample as usize] = kept.gains.map(f64::from);
         }
         let density = bench.density(samples.len())?;
         let spans: Vec<[u32; 2]> = bench.read("ray_spans", rays)?;
@@ -237,7 +233,7 @@ impl TinyTraining {
             let position = vector(&samples[index]);
             let [origin, direction] = directions[ray].each_ref().map(vector);
             let distance = (position - origin).dot(direction) * scale;
-            RaySample { position, delta: f64::from(samples[index][3]), gain: gains[index], distance }
+            RaySample { position, delta: f64::from(samples[index][3]), gains: gains[index], distance }
         };
         let stop = bench.plan.config.selection.stop_transmittance;
         let of_ray = |ray: usize| -> Vec<RaySample> {

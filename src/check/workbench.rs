@@ -200,8 +200,8 @@ impl Workbench {
         if self.plan.needs.depth {
             let depths: Vec<_> = rays.iter().map(|ray| ray.depth as f32).collect();
             self.write("depth_targets", &depths);
-            self.write("ray_origins", &vec![[0.0_f32; 4]; rays.len()]);
         }
+        self.write("ray_origins", &vec![[0.0_f32; 4]; rays.len()]);
         self.write("ray_directions", &directions);
         self.write("ray_spans", &spans);
         self.write("samples", &samples);

@@ -75,7 +75,7 @@ fn training_selection(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<[
             EXP,
             DENSITY,
             OCCUPANCY,
-            part!("refresh/marched.wgsl"),
+            part!("common/refresh.wgsl"),
             part!("select.wgsl"),
         ],
         &[],

@@ -12,7 +12,7 @@ use super::activation::{color, color_backward, log_density, log_density_backward
 use super::composite::CompositeInput;
 use super::grid::{GridLevel, grid_encode, grid_encode_backward};
 use super::harmonics::harmonics;
-use super::loss::{Loss, composite_with};
+use super::loss::{Loss, Places, composite_with};
 use super::mlp::Mlp;
 use super::{ColorRange, Transmittance};
 
@@ -47,9 +47,10 @@ pub struct RaySample {
     pub position: DVec3,
     /// Step, in the unit of the density.
     pub delta: f64,
-    /// How many times its own weight its colour has; 0 where it is left out, see [`super::selection`].
-    pub gain: f64,
-    /// Distance along the ray, in the unit of its depth.
+    /// How many times its own weight its colour has in both estimates; 0 in both where it is left out, see
+    /// [`super::selection`].
+    pub gains: [f64; 2],
+    /// Distance along the ray, in sides of the inner cube, like the ray's depth.
     pub distance: f64,
 }
 
@@ -86,6 +87,8 @@ pub struct BatchOutput {
     pub loss: f64,
     /// `[rays, 4]`: composited colour and opacity.
     pub rendered: Vec<[f64; 4]>,
+    /// `[rays, 4]`: squared errors of both, with their weights.
+    pub loss_terms: Vec<[f64; 4]>,
     /// Gradients of the loss.
     pub gradients: Gradients,
 }
@@ -122,6 +125,7 @@ impl Model {
         let mut batch = BatchOutput {
             loss: 0.0,
             rendered: Vec::new(),
+            loss_terms: Vec::new(),
             gradients: Gradients {
                 table: vec![0.0; self.table.len()],
                 density: self.density.zero_gradients(),
@@ -131,10 +135,7 @@ impl Model {
         for ray in rays {
             let evaluations: Vec<Evaluation> =
                 (ray.samples.iter()).map(|sample| self.evaluate(sample.position, ray.direction)).collect();
-            let offsets: Vec<f64> = match ray.depth > 0.0 {
-                true => ray.samples.iter().map(|sample| sample.distance - ray.depth).collect(),
-                false => Vec::new(),
-            };
+            let distances = collect(&ray.samples, |sample| sample.distance);
             let composited = composite_with(
                 objective.loss,
                 objective.transmittance,
@@ -148,13 +149,14 @@ impl Model {
                     background: ray.background,
                     rays_in_batch: rays.len() as u32,
                 },
-                &offsets,
-                &collect(&ray.samples, |sample| sample.gain),
+                Places { distances: &distances, depth: ray.depth },
+                &collect(&ray.samples, |sample| sample.gains),
             );
             batch.loss += composited.loss;
             batch.rendered.push(composited.rendered);
+            batch.loss_terms.push(composited.loss_terms);
             for (i, (sample, evaluation)) in ray.samples.iter().zip(&evaluations).enumerate() {
-                if sample.gain == 0.0 {
+                if sample.gains == [0.0; 2] {
                     continue;
                 }
                 let d_s = composited.d_s[i];

@@ -105,8 +105,8 @@ fn adam_on_table_and_networks() -> Result<()> {
 }
 
 #[test]
-fn depth_and_relative_errors() -> Result<()> {
-    passes([loss::depth_and_relative_errors(&subject()?)?]);
+fn further_terms_of_the_loss() -> Result<()> {
+    passes(loss::further_terms(&subject()?)?);
     Ok(())
 }
 
@@ -187,7 +187,8 @@ fn tensors_in_buffers() -> Result<()> {
     passes(adam::adam(&subject)?);
     passes([occupancy::occupancy_update(&subject)?]);
     passes(view::rendered_views(&subject)?);
-    passes([rays::training_rays(&subject)?, loss::depth_and_relative_errors(&subject)?]);
+    passes([rays::training_rays(&subject)?]);
+    passes(loss::further_terms(&subject)?);
     let setups = step::setups();
     passes([step::one_step(&subject, &[setups[0].clone(), setups[4].clone()])?]);
     Ok(())

@@ -109,7 +109,12 @@ impl Device {
         let training_ray = |ray: &Samples| TrainingRay {
             direction: DVec3::Z,
             samples: vec![
-                RaySample { position: DVec3::ZERO, delta: ray.delta, gain: 1.0, distance: 0.0 };
+                RaySample {
+                    position: DVec3::ZERO,
+                    delta: ray.delta,
+                    gains: [1.0; 2],
+                    distance: 0.0
+                };
                 ray.s.len()
             ],
             target: [0.0; 4],
