@@ -102,6 +102,10 @@ impl Splits {
     }
 }
 
+/// Settings that earlier trainings had, which rendering does not need and training no longer knows.
+const RETIRED: [(&str, &str); 3] =
+    [("selection", "keep_probability"), ("occupancy", "warm_up"), ("occupancy", "stride")];
+
 impl About {
     /// The layout of the parameters.
     #[must_use]
@@ -122,7 +126,7 @@ impl About {
     }
 
     fn parse(text: &str) -> Result<Self> {
-        let value: Value = serde_json::from_str(text).context("its description is not JSON")?;
+        let mut value: Value = serde_json::from_str(text).context("its description is not JSON")?;
         match value["format"].as_u64() {
             Some(FORMAT) => {}
             Some(other) => {
@@ -132,6 +136,11 @@ impl About {
                 )
             }
             None => bail!("its description has no format number"),
+        }
+        for (group, key) in RETIRED {
+            if let Some(settings) = value["config"][group].as_object_mut() {
+                settings.remove(key);
+            }
         }
         let about: Self = serde_json::from_value(value).context("its description is not understood")?;
         about.config.validate().context("its configuration")?;
@@ -336,6 +345,18 @@ mod tests {
         std::fs::remove_file(&path).expect("removable");
         assert!(complaint(&path).contains("reading the checkpoint"));
         assert!(locate(folder.path()).is_err() && locate(&path).is_err());
+    }
+
+    #[test]
+    fn settings_of_earlier_trainings_are_left_out() {
+        let about = checkpoint().about;
+        let mut value = serde_json::to_value(&about).expect("JSON");
+        for (group, key) in RETIRED {
+            value["config"][group][key] = 0.5.into();
+        }
+        assert_eq!(About::parse(&value.to_string()).expect("known"), about);
+        value["config"]["occupancy"]["unheard_of"] = 1.into();
+        assert!(About::parse(&value.to_string()).is_err());
     }
 
     #[test]

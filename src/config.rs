@@ -119,7 +119,6 @@ pub struct Selection {
     /// for all. 0 keeps every sample.
     pub weight_floor: f64,
     /// A group whose weight stays below this share of the floor is kept with a probability in proportion to its weight.
-    #[serde(alias = "keep_probability")]
     pub light_share: f64,
     /// A ray ends where its transmittance falls below this.
     pub stop_transmittance: f64,
