@@ -305,6 +305,7 @@ fn rays_that_miss_the_box() {
 fn more_samples_than_fit() {
     let mut config = config();
     config.batch = Batch { kept: 512, samples: 1024, rays: 16_384, first_rays: 16_384 };
+    config.march.longest_step = 1.0;
     let mut training = Scene::default().train_with(config.clone());
     let first = training.steps(1);
     assert!(first.rays < 100 && first.marched <= 1024 && first.samples <= 768, "{first:?}");

@@ -1,7 +1,5 @@
 // Provides: kept_distance, how far along its ray a kept sample lies, in sides of the inner cube.
 
-tensor<read> ray_origins: vec4<f32>;
-tensor<read> ray_directions: vec4<f32>;
 tensor<read> samples: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
 

@@ -1,4 +1,4 @@
-// Needs: counters, sum, transmittance, behind_next, kept_distance. Provides: the depth's share of the loss, DEPTH_WEIGHT / M times the
+// Needs: counters, sum, transmittance, behind_next, ray_load, kept_distance. Provides: the depth's share of the loss, DEPTH_WEIGHT / M times the
 // square of sum_i w_i (t_i - g) over the rays whose distance g is known. It is a fifth channel whose colour is t_i - g,
 // over 0: what is transparent is left to the other channels. Distances are in sides of the inner cube.
 
@@ -18,7 +18,8 @@ struct DepthRay {
 
 fn depth_begin(ray: u32) -> DepthRay {
     let goal = depth_targets[ray];
-    return DepthRay(ray_origins_load(ray).xyz, goal, ray_directions_load(ray).xyz, 0.0, sum_of(vec4(0.0)), 0.0);
+    let line = ray_load(ray);
+    return DepthRay(line.origin, goal, line.direction, 0.0, sum_of(vec4(0.0)), 0.0);
 }
 
 // The channel's colour of a sample.

@@ -1,4 +1,4 @@
-// Needs: counters, sum, transmittance, behind_next, kept_distance. Provides: the distortion's share of the loss (Barron et al. 2022,
+// Needs: counters, sum, transmittance, behind_next, ray_load, kept_distance. Provides: the distortion's share of the loss (Barron et al. 2022,
 // eq. 15), DISTORTION / M times sum_ij w_i w_j |x_i - x_j| + 1/3 sum_i w_i^2 dx_i: it pulls the weights of a ray together.
 // x = t / (1 + t), with t in sides of the inner cube. Its slope by w_i is the colour of a further channel over 0.
 // See `reference::loss`.
@@ -14,7 +14,8 @@ struct SpreadRay {
 }
 
 fn spread_begin(ray: u32) -> SpreadRay {
-    return SpreadRay(ray_origins_load(ray).xyz, ray_directions_load(ray).xyz, vec2(0.0), 0.0, sum_of(vec4(0.0)));
+    let line = ray_load(ray);
+    return SpreadRay(line.origin, line.direction, vec2(0.0), 0.0, sum_of(vec4(0.0)));
 }
 
 // x of a sample, and how long its step is there.

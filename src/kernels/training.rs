@@ -4,8 +4,8 @@ use super::color::COLOR_HIDDEN;
 use super::density::{layer_stage, quads};
 use super::marching::{SPARE_ROWS, kept_capacity};
 use super::{
-    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_STORE, STEP, SUM,
-    USABLE, Workspace, dispatch,
+    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_LOAD, RAY_STORE,
+    STEP, SUM, USABLE, Workspace, dispatch,
 };
 use crate::config::Accumulation;
 use crate::gpu::Gpu;
@@ -107,7 +107,7 @@ pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -
     ];
     let mut parts = parts.to_vec();
     if plan.needs.depth || plan.config.loss.distortion > 0.0 {
-        parts.push(part!("common/kept_distance.wgsl"));
+        parts.extend([RAY, RAY_LOAD, part!("common/kept_distance.wgsl")]);
     }
     let kernel = plan.kernel(gpu, "composite", &parts)?;
     Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
