@@ -74,7 +74,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let d_results = array(share * errors[1], share * errors[0]);
     distance = depth_turn(distance);
     spread = spread_turn(spread);
-    var behind = array(sum_of(exp_accurate(-tail) * background), sum_of(exp_accurate(-tail) * background));
+    let last_behind = sum_of(exp_accurate(-tail) * background);
+    var behind = array(last_behind, last_behind);
     var missing = vec2(opacity(tail));
     for (var i = end; i > span.x; i--) {
         let known = d_color_load(i - 1u);
@@ -95,12 +96,9 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         d_color_store(i - 1u, vec4(d_c, root * (root * d_s)));
         distance = depth_backward(distance, i - 1u, part, zero);
         spread = spread_backward(spread, i - 1u, known.zw, sample_weight, part, zero);
-        behind[0] = behind_next(behind[0], color, with_gain(part, gains.x), zero);
-        behind[1] = behind_next(behind[1], color, with_gain(part, gains.y), zero);
-        missing = vec2(
-            missing_next(missing.x, with_gain(part, gains.x)),
-            missing_next(missing.y, with_gain(part, gains.y)),
-        );
+        let parts = array(with_gain(part, gains.x), with_gain(part, gains.y));
+        behind = array(behind_next(behind[0], color, parts[0], zero), behind_next(behind[1], color, parts[1], zero));
+        missing = vec2(missing_next(missing.x, parts[0]), missing_next(missing.y, parts[1]));
     }
 }
 

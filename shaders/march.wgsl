@@ -8,8 +8,7 @@ var<storage, read_write> ray_steps: array<u32>;
 var<storage, read_write> ray_spans: array<vec2<u32>>;
 
 fn occupied(position: vec3<f32>, cascade: u32) -> bool {
-    let cell = vec3<u32>(clamp(cascade_position(position, cascade), vec3(0.0), vec3(f32(CELLS) - 1.0)));
-    let index = cell_index(cell, cascade);
+    let index = cell_around(position, cascade);
     return ((occupancy_bits_load(index >> 5u) >> (index & 31u)) & 1u) == 1u;
 }
 

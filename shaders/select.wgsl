@@ -5,7 +5,7 @@
 // group that stays lighter than LIGHT_SHARE of the floor is kept by chance; what that adds to the ray's weight or takes
 // from it is made up for by the estimate's next kept sample. Opacity and transmittance are those of all samples.
 // Nothing is kept behind the point where the ray is opaque; see `reference::selection`.
-// Needs: random, step, counters, exp, density, refresh.
+// Needs: random, step, counters, exp, density, occupancy, occupancy_raise.
 
 var<storage, read> counters: Counters;
 tensor<read> samples: vec4<f32>;
@@ -108,7 +108,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let log_density = density_log(density_out_load(i * DENSITY_QUADS).x);
         let tau = optical_depth(log_density, sample.w);
         let member = Member(i, transmittance * opacity(tau), depth, tau);
-        occupancy_refresh(sample.xyz, log_density);
+        // Where rays go, the occupancy grid costs no samples of its own.
+        occupancy_raise(cell_around(sample.xyz, cascade_at(sample.xyz)), log_density);
         if member.weight >= WEIGHT_FLOOR {
             walk = close(walk);
             walk = keep(walk, member, 1.0 + walk.carry / max(member.weight, 1e-30));

@@ -24,6 +24,8 @@ fn cascade_position(position: vec3<f32>, cascade: u32) -> vec3<f32> {
     return ((position - 0.5) / cascade_side(cascade) + 0.5) * f32(CELLS);
 }
 
-fn cell_index(cell: vec3<u32>, cascade: u32) -> u32 {
+// The cell of a cascade around a box-space position, or the nearest one.
+fn cell_around(position: vec3<f32>, cascade: u32) -> u32 {
+    let cell = vec3<u32>(clamp(cascade_position(position, cascade), vec3(0.0), vec3(f32(CELLS) - 1.0)));
     return cell.x + CELLS * (cell.y + CELLS * (cell.z + CELLS * cascade));
 }

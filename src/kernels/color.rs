@@ -3,10 +3,9 @@
 use super::density::{forward, layer_stage};
 use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
 use super::{
-    COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, OCCUPANCY, Plan, RANDOM, STEP, Workspace, dispatch,
-    viewing,
+    COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, OCCUPANCY, OCCUPANCY_RAISE, Plan, RANDOM, STEP, Workspace,
+    dispatch, viewing,
 };
-use crate::config::Transmittance;
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::{Size, Stage};
@@ -31,10 +30,7 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     let rows = kept_capacity(&plan.config.batch) + SPARE_ROWS;
     let mut demands = vec![
         plan.tensor("chosen", Element::Vec4, plan.config.batch.samples),
-        Demand::storage::<f32>("ray_tails", plan.config.batch.rays),
         plan.tensor("kept_rows", Element::Pair, rows),
-        plan.tensor("kept_steps", Element::Vec4, rows),
-        plan.tensor("kept_gains", Element::Vec2, rows),
         plan.tensor("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
         plan.tensor("color", Element::Vec4, rows),
     ];
@@ -47,10 +43,12 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
-    let [select, kept] = match selection {
-        Selection::Training => training_selection(gpu, plan, workspace)?,
-        Selection::View => [viewing::select(gpu, plan, workspace)?, viewing::kept(gpu, plan, workspace)?],
+    let (select, packing) = match selection {
+        Selection::Training => (select(gpu, plan, workspace)?, part!("packing/training.wgsl")),
+        Selection::View => (viewing::select(gpu, plan, workspace)?, part!("packing/view.wgsl")),
     };
+    let kept = [COUNTERS, DENSITY, packing, part!("kept.wgsl")];
+    let kept = plan.ray_stage(gpu, workspace, "kept", &kept)?;
     let input = plan.kernel(gpu, "color input", &[COUNTERS, HARMONICS, part!("color_input.wgsl")])?;
     let input = Stage::indirect(workspace.bind(gpu, &input, &[])?, workspace.get("dispatch"), dispatch::KEPT);
     let mut stages = vec![select, scan(gpu, plan, workspace, Scanned::Kept)?, kept, input];
@@ -58,35 +56,10 @@ pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selectio
     Ok(stages)
 }
 
-/// The kernels that choose and pack the samples of a training.
-fn training_selection(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<[Stage; 2]> {
-    // Inclusive weights are no shares of one whole, so that none can stand for others.
-    let floor = match plan.config.transmittance {
-        Transmittance::Inclusive => 0.0,
-        Transmittance::Exclusive => plan.config.selection.weight_floor as f32,
-    };
-    let select = plan.generated_kernel(
-        gpu,
-        "select",
-        &[
-            RANDOM,
-            STEP,
-            COUNTERS,
-            EXP,
-            DENSITY,
-            OCCUPANCY,
-            part!("common/refresh.wgsl"),
-            part!("select.wgsl"),
-        ],
-        &[],
-        format!("const WEIGHT_FLOOR = f32({floor:?});"),
-    )?;
-    let kept = plan.kernel(gpu, "kept", &[COUNTERS, DENSITY, part!("kept.wgsl")])?;
-    let over_rays = |kernel| -> Result<Stage> {
-        let sizes = workspace.get("dispatch");
-        Ok(Stage::indirect(workspace.bind(gpu, kernel, &[])?, sizes, dispatch::RAYS))
-    };
-    Ok([over_rays(&select)?, over_rays(&kept)?])
+/// Chooses the samples of a training.
+fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
+    let parts = [RANDOM, STEP, COUNTERS, EXP, DENSITY, OCCUPANCY, OCCUPANCY_RAISE, part!("select.wgsl")];
+    plan.ray_stage(gpu, workspace, "select", &parts)
 }
 
 /// The colour network's layers.

@@ -45,6 +45,9 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     // Integers of 64 bits take twice the room of floats.
     let words = if plan.accumulation == Accumulation::Fixed { 2 } else { 1 };
     let mut demands = vec![
+        plan.tensor("kept_steps", Element::Vec4, rows),
+        plan.tensor("kept_gains", Element::Vec2, rows),
+        Demand::storage::<f32>("ray_tails", batch.rays),
         plan.tensor("d_color", Element::Vec4, rows),
         plan.tensor("d_raw_color", Element::Vec4, rows),
         plan.tensor("d_density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
@@ -94,7 +97,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -> Result<Stage> {
     let weights = if weights { part!("weights/stored.wgsl") } else { part!("weights/none.wgsl") };
-    let parts = [
+    let mut parts = vec![
         COUNTERS,
         EXP,
         SUM,
@@ -105,12 +108,10 @@ pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -
         weights,
         part!("composite.wgsl"),
     ];
-    let mut parts = parts.to_vec();
     if plan.needs.depth || plan.config.loss.distortion > 0.0 {
         parts.extend([RAY, RAY_LOAD, part!("common/kept_distance.wgsl")]);
     }
-    let kernel = plan.kernel(gpu, "composite", &parts)?;
-    Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
+    plan.ray_stage(gpu, workspace, "composite", &parts)
 }
 
 /// Gradients of all activations, from the colour back to the encoding.

@@ -1,8 +1,8 @@
 //! What only rendering needs: how much of a view is in work at once, its rays and their compositing.
 
 use super::{
-    CAMERA, COUNTERS, Camera, DENSITY, EXP, Needs, PROGRESS, Part, Plan, Progress, RAY, RAY_STORE, SUM,
-    Traits, Workspace, dispatch,
+    CAMERA, COUNTERS, Camera, DENSITY, EXP, Needs, PROGRESS, Plan, Progress, RAY, RAY_STORE, SUM, Traits,
+    Workspace,
 };
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
@@ -69,7 +69,7 @@ pub fn demands(plan: &Plan) -> Vec<Demand> {
 /// When the kernel cannot be built.
 pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
     let parts = [COUNTERS, PROGRESS, RAY, RAY_STORE, CAMERA, part!("view_rays.wgsl")];
-    stage(gpu, plan, workspace, "view rays", &parts)
+    plan.ray_stage(gpu, workspace, "view rays", &parts)
 }
 
 /// Chooses the samples that get colour.
@@ -78,15 +78,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// When the kernel cannot be built.
 pub(super) fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
     let parts = [COUNTERS, RAY, CAMERA, EXP, DENSITY, plan.transmittance(), SUM, part!("view_select.wgsl")];
-    stage(gpu, plan, workspace, "view select", &parts)
-}
-
-/// Packs them.
-///
-/// # Errors
-/// When the kernel cannot be built.
-pub(super) fn kept(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    stage(gpu, plan, workspace, "view kept", &[COUNTERS, part!("view_kept.wgsl")])
+    plan.ray_stage(gpu, workspace, "view select", &parts)
 }
 
 /// Adds their colours, and writes the pixels of rays that ended.
@@ -94,10 +86,5 @@ pub(super) fn kept(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stag
 /// # Errors
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    stage(gpu, plan, workspace, "view composite", &[COUNTERS, PROGRESS, part!("view_composite.wgsl")])
-}
-
-fn stage(gpu: &Gpu, plan: &Plan, workspace: &Workspace, label: &str, parts: &[Part]) -> Result<Stage> {
-    let kernel = plan.kernel(gpu, label, parts)?;
-    Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
+    plan.ray_stage(gpu, workspace, "view composite", &[COUNTERS, PROGRESS, part!("view_composite.wgsl")])
 }
