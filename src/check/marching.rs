@@ -4,7 +4,7 @@ use super::draw::{Random, uniform};
 use super::rays::{drawn, pixel_camera};
 use super::{Setup, Subject, Tally, Workbench};
 use crate::gpu::pass::Stage;
-use crate::kernels::{dimension, marching, training};
+use crate::kernels::{Counters, dimension, marching, training};
 use crate::reference::march::{BoxRay, March, MarchSample, box_interval};
 use crate::reference::occupancy::{OccupancyShape, is_set};
 use anyhow::Result;
@@ -20,6 +20,8 @@ pub struct Marching {
     pub bench: Workbench,
     /// The cameras' rays.
     pub rays: Vec<BoxRay>,
+    /// By how much their steps are longer than the configuration's, as a share of them.
+    pub step_excess: f32,
     /// With and without jitter.
     stages: [Vec<Stage>; 2],
 }
@@ -32,7 +34,8 @@ struct Found {
     differing: usize,
 }
 
-/// Samples of random rays through random occupancy, in one cascade and in three, empty and full grids among them.
+/// Samples of random rays through random occupancy, in one cascade and in three, with steps as configured and longer ones,
+/// empty and full grids among them.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
@@ -51,11 +54,12 @@ pub fn marched_samples(subject: &Subject) -> Result<Vec<Tally>> {
         agreeing: 0,
         differing: 0,
     };
-    for cascades in [1, 3] {
+    for (cascades, step_excess) in [(1, 0.0), (3, 0.0), (1, 0.75), (3, 0.75), (3, 7.0)] {
         let mut setup = Setup::tiny();
         setup.needs.cascades = cascades;
         setup.config.batch.samples = 16384;
-        let marching = Marching::new(subject, setup)?;
+        let mut marching = Marching::new(subject, setup)?;
+        marching.step_excess = step_excess;
         let mut random = Random::new(50 + cascades);
         let cells = marching.bench.plan.cell_count();
         for (count, share, jitter) in [
@@ -99,7 +103,7 @@ impl Marching {
             Ok(stages)
         };
         let stages = [stages(false)?, stages(true)?];
-        Ok(Self { bench, rays, stages })
+        Ok(Self { bench, rays, step_excess: 0.0, stages })
     }
 
     /// Draws and marches `count` rays.
@@ -108,19 +112,21 @@ impl Marching {
     /// When the device was lost.
     pub fn run(&self, words: &[u32], count: usize, jitter: bool) -> Result<()> {
         self.bench.write("occupancy_bits", words);
-        self.bench.set_rays(count);
+        let (rays, step_excess) = (count as u32, self.step_excess);
+        self.bench.set_counters(Counters { rays, step_excess, ..Counters::default() });
         self.bench.run(&self.stages[usize::from(jitter)])
     }
 
     /// The reference of this plan.
     fn reference(&self) -> March {
-        reference(&self.bench)
+        March { scale: 1.0 + f64::from(self.step_excess), ..reference(&self.bench) }
     }
 
     fn compare(&self, found: &mut Found, words: &[u32], count: usize, jitter: bool) -> Result<()> {
         self.run(words, count, jitter)?;
         let march = self.reference();
-        let case = format!("{} cascades, {count} rays", march.shape.cascades);
+        let case =
+            format!("{} cascades, steps {} times as long, {count} rays", march.shape.cascades, march.scale);
         let counters = self.bench.counters()?;
         let spans: Vec<[u32; 2]> = self.bench.read("ray_spans", count)?;
         let samples: Vec<[f32; 4]> = self.bench.read("samples", counters.samples as usize)?;

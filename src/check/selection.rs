@@ -7,6 +7,7 @@ use crate::kernels::{color, dimension};
 use crate::reference::activation::{MAX_LOG_DENSITY, log_density};
 use crate::reference::composite::optical_depth;
 use crate::reference::model::TrainingRay;
+use crate::reference::occupancy::{OccupancyShape, visit};
 use crate::reference::selection::{self, Luck, select};
 use anyhow::Result;
 
@@ -21,7 +22,8 @@ pub struct Selecting {
     stages: Vec<Stage>,
 }
 
-/// Chosen samples and what they stand for in both estimates: of ordinary rays, of a fog in which most end, with a high floor, and all.
+/// Chosen samples and what they stand for in both estimates: of ordinary rays, of a fog in which most end, with a high
+/// floor, and all; and the occupancy grid, which all marched samples raise.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
@@ -49,7 +51,10 @@ pub fn selected_samples(subject: &Subject) -> Result<Tally> {
         let selecting = Selecting::new(subject, setup)?;
         let rays = random_batch(&mut random, 33, 130);
         let raw: Vec<f32> = raw_densities(&mut random, 130).into_iter().map(|raw| raw.min(0.0)).collect();
+        let first = selecting.first_occupancy();
+        selecting.bench.write("occupancy", &first);
         let kept = selecting.compare(&mut tally, &rays, &raw)?;
+        selecting.compare_occupancy(&mut tally, &first, (&rays, &raw))?;
         tally.holds((kept == 130) == (floor == 0.0), || format!("{kept} kept with a floor of {floor}"));
     }
     Ok(tally)
@@ -95,6 +100,32 @@ impl Selecting {
         self.bench.upload(rays)?;
         self.bench.set_raw_density(raw);
         self.bench.run(&self.stages)
+    }
+
+    /// Cells that hold something, nothing, and can hold nothing.
+    fn first_occupancy(&self) -> Vec<f32> {
+        (0..self.bench.plan.cell_count()).map(|cell| [0.0, 0.004, -1.0, 0.02][cell % 4]).collect()
+    }
+
+    /// Every marched sample of rays without an end raises its cell, whatever is kept.
+    fn compare_occupancy(
+        &self,
+        tally: &mut Tally,
+        first: &[f32],
+        (rays, raw): (&[TrainingRay], &[f32]),
+    ) -> Result<()> {
+        let plan = &self.bench.plan;
+        let shape = OccupancyShape { cascades: plan.needs.cascades, resolution: plan.config.occupancy.cells };
+        let mut want: Vec<f64> = first.iter().map(|&value| value.into()).collect();
+        for (sample, &raw) in rays.iter().flat_map(|ray| &ray.samples).zip(raw) {
+            let cell = &mut want[shape.cell(sample.position)];
+            *cell = visit(*cell, raw.into(), plan.step_min() * plan.density_scale());
+        }
+        let got: Vec<f32> = self.bench.read("occupancy", want.len())?;
+        tally.each("occupancy", &got, &want, |cell| want[cell].abs().max(1e-6));
+        let raised = want.iter().zip(first).filter(|(now, then)| **now > f64::from(**then)).count();
+        tally.holds(raised > 20, || format!("{raised} cells were raised"));
+        Ok(())
     }
 
     /// Compares with the reference; returns how many samples were kept.

@@ -7,7 +7,7 @@ use crate::camera::{Camera, Lens};
 use crate::config::{Background, Optimizer, Selection};
 use crate::dataset::{Bounds, Photo};
 use crate::image::{Image, Pixels};
-use crate::kernels::Needs;
+use crate::kernels::{Needs, STEP_GROWTH, STEP_SHRINKAGE};
 use crate::model::DENSITY_OUTPUTS;
 use crate::reference::Transmittance;
 use crate::reference::activation::log_density;
@@ -93,7 +93,7 @@ fn color_error(output: &BatchOutput) -> f64 {
     sum / (3.0 * output.loss_terms.len() as f64)
 }
 
-/// The number of rays of the next step, which follows how many samples this one's rays had.
+/// The number of rays of the next step and the length of their steps, which follow how many samples this one's rays had.
 fn compare_rays(tally: &mut Tally, name: &str, bench: &Workbench) -> Result<()> {
     let counters = bench.counters()?;
     let batch = &bench.plan.config.batch;
@@ -104,6 +104,11 @@ fn compare_rays(tally: &mut Tally, name: &str, bench: &Workbench) -> Result<()> 
     let want = (asked * fit_kept.min(fit_samples).clamp(0.5, 1.5)).clamp(16.0, batch.rays as f64);
     let got = f64::from(counters.rays);
     tally.holds((got - want).abs() <= 1.0, || format!("{name}: {got} rays next instead of {want}"));
+    let march = &bench.plan.config.march;
+    let crowding = f64::from(counters.samples_wanted) / (asked * march.samples_per_ray);
+    let scale = march.longest_step * crowding.clamp(STEP_SHRINKAGE, STEP_GROWTH);
+    let scale = scale.clamp(1.0, march.longest_step);
+    tally.value(1.0 + f64::from(counters.step_excess), scale, scale, || format!("{name}: length of steps"));
     Ok(())
 }
 
@@ -160,6 +165,7 @@ impl TinyTraining {
         setup.config.optimizer = Optimizer::default();
         // High enough that every batch has light samples, of which some are dropped.
         setup.config.selection = Selection { weight_floor: 0.05, light_share: 0.5, stop_transmittance: 1e-4 };
+        (setup.config.march.longest_step, setup.config.march.samples_per_ray) = (1.5, 20.0);
         setup.config.batch.kept = 1024;
         setup.config.batch.samples = 4096;
         let mut random = Random::new(80);
