@@ -117,7 +117,7 @@ pub fn median_depth(depth: &[f32]) -> f64 {
 pub fn fog(near_share: f64) -> Option<String> {
     (near_share > FOG).then(|| {
         format!(
-            "surfaces seem to hang right in front of the cameras: {} of the test views' pixels show something nearer \
+            "surfaces seem to hang right in front of the cameras: {} of the pixels measured show something nearer \
              than half the way to what the cameras look at. Unless the scene really has something there, the photos are \
              painted onto fog near each lens, and other views show that fog. Check the poses with `nerf info`; photos \
              from more directions and a longer training may help, and so may a larger march.near, the distance from \

@@ -99,7 +99,9 @@ pub(super) fn measure(
     remarks: Remarks,
 ) -> Result<TestViews> {
     let mut views = TestViews::default();
-    let order = spread_order(indices.len());
+    let mut order = spread_order(indices.len());
+    // Where only one fits it is one from the middle: the first of a capture is often easier than the others.
+    order.rotate_left(1.min(indices.len()));
     let spread: Vec<usize> = order.iter().map(|&position| indices[position]).collect();
     let reached = judge.each(&spread, limit, remarks, |number, compared| {
         let Compared { score, size, rendered, photo, depth, unit } = &compared;
