@@ -5,11 +5,11 @@
 // squared error is their product: (R' - g)(R'' - g), whose mean is the square of the mean error. The square of a single
 // estimate would hold its variance too, and gradients would make rays opaque too early, where nothing is left out. A
 // whole ray has one colour, and both are that.
-// Needs: counters, exp, sum, transmittance, loss, depth_loss, distortion, weights.
+// Needs: counters, exp, sum, transmittance, loss, depth_loss, distortion, sparsity, weights.
 
 var<storage, read> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
-// Log-density, step length, and optical depth left out in front of the sample.
+// Log-density, step length, optical depth left out in front of the sample, and rarity of its place.
 tensor<read> kept_steps: vec4<f32>;
 // How many times its own weight a sample's colour has in both estimates.
 tensor<read> kept_gains: vec2<f32>;
@@ -20,7 +20,7 @@ var<storage, read> targets: array<vec4<f32>>;
 var<storage, read> backgrounds: array<vec4<f32>>;
 // Colour over the background, and opacity.
 var<storage, read_write> rendered: array<vec4<f32>>;
-// Squared errors of the four channels with their weights; opacity's also holds what the depth adds.
+// Squared errors of the four channels with their weights; opacity's also holds what the further terms add.
 var<storage, read_write> ray_errors: array<vec4<f32>>;
 // dL/dc in rgb and dL/ds in w. Between the walks it holds tau and the root of T of each
 // sample, and what the distortion sums up in front of it.
@@ -42,6 +42,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var sums = array(sum_of(vec4(0.0)), sum_of(vec4(0.0)));
     var distance = depth_begin(index);
     var spread = spread_begin(index);
+    var sparsity = 0.0;
     for (var i = span.x; i < end; i++) {
         let kept = kept_steps_load(i);
         let gains = kept_gains_load(i);
@@ -57,6 +58,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         distance = depth_forward(distance, i, root, gain * alpha, zero);
         d_color_store(i, vec4(tau, root, spread_before(spread)));
         spread = spread_forward(spread, i, root * (root * gain * alpha));
+        sparsity += sparsity_error(i, root, gain);
         depth = sum_add(depth, vec4(tau), zero);
     }
     let through = squared_times(exp_accurate(-0.5 * (depth.value.x + tail)), background);
@@ -66,7 +68,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let errors = array(first - targets[index], second - targets[index]);
     let weight = loss_weight(result, targets[index]);
     rendered[index] = result;
-    let further = depth_squared_error(distance) + spread_error(spread);
+    let further = depth_squared_error(distance) + spread_error(spread) + sparsity;
     ray_errors[index] = weight * errors[0] * errors[1] + vec4(0.0, 0.0, 0.0, further);
 
     // dL/dR of each estimate, of which the error of the other is a factor.
@@ -93,7 +95,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let d_s = part.tau * (gains.x * first + gains.y * second + gain * (by_depth + by_spread));
         let d_c = squared_times(known.y, alpha * (gains.x * d_results[0] + gains.y * d_results[1])).rgb;
         let root = gradient_root(known.y, part.passing_root);
-        d_color_store(i - 1u, vec4(d_c, root * (root * d_s)));
+        d_color_store(i - 1u, vec4(d_c, root * (root * d_s) + sparsity_gradient(i - 1u, known.y, gain)));
         distance = depth_backward(distance, i - 1u, part, zero);
         spread = spread_backward(spread, i - 1u, known.zw, sample_weight, part, zero);
         let parts = array(with_gain(part, gains.x), with_gain(part, gains.y));

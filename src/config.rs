@@ -137,6 +137,8 @@ pub struct Loss {
     pub depth: f64,
     /// Weight of the distortion (Barron et al. 2022), which pulls the weights along a ray together; 0 leaves it out.
     pub distortion: f64,
+    /// Weight of the sparsity, which clears what is thin, first where few cameras look; 0 leaves it out.
+    pub sparsity: f64,
 }
 
 /// How errors of the colour count.

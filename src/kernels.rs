@@ -56,6 +56,7 @@ const OCCUPANCY: Part = part!("common/occupancy.wgsl");
 const OCCUPANCY_RAISE: Part = part!("common/occupancy_raise.wgsl");
 const MARCH_START: Part = part!("common/march_start.wgsl");
 pub(crate) const EXP: Part = part!("common/exp.wgsl");
+const LOG: Part = part!("common/log.wgsl");
 const SUM: Part = part!("common/sum.wgsl");
 pub(crate) const DENSITY: Part = part!("common/density.wgsl");
 const GRID: Part = part!("common/grid.wgsl");
@@ -256,8 +257,11 @@ impl Plan {
         lens::parts(lenses).iter().fold(source, add).part("lens choice", lens::choice(lenses))
     }
 
-    fn stepping(&self) -> Part {
-        if self.needs.cascades > 1 { part!("stepping/cone.wgsl") } else { part!("stepping/uniform.wgsl") }
+    fn stepping(&self) -> &'static [Part] {
+        match self.needs.cascades > 1 {
+            true => &[LOG, part!("stepping/cone.wgsl")],
+            false => &[part!("stepping/uniform.wgsl")],
+        }
     }
 
     pub(crate) fn activation(&self) -> Part {
@@ -292,6 +296,20 @@ impl Plan {
         match self.config.loss.distortion > 0.0 {
             true => part!("distortion/pairs.wgsl"),
             false => part!("distortion/none.wgsl"),
+        }
+    }
+
+    fn sparsity(&self) -> &'static [Part] {
+        match self.config.loss.sparsity > 0.0 {
+            true => &[LOG, part!("sparsity/logarithm.wgsl")],
+            false => &[part!("sparsity/none.wgsl")],
+        }
+    }
+
+    fn rarity(&self) -> &'static [Part] {
+        match self.config.loss.sparsity > 0.0 {
+            true => &[OCCUPANCY, part!("rarity/stored.wgsl")],
+            false => &[part!("rarity/none.wgsl")],
         }
     }
 

@@ -18,6 +18,12 @@ const VIEWS_TO_CARVE: usize = 2;
 /// Pixels added around a cell's footprint, for filtered edges and inexact poses.
 const MARGIN_PX: f64 = 1.5;
 
+/// Cells along each axis of a cascade that [`rarities`] tells apart.
+pub const RARITY_CELLS: u32 = 16;
+
+/// The most that a place can be rarer than the best seen one.
+const RAREST: f64 = 50.0;
+
 /// What one view says of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sight {
@@ -41,6 +47,23 @@ pub fn hidden_cells(
     let views: Vec<View<'_>> =
         cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
     let carves = views.iter().any(|view| !view.silhouette.is_opaque());
+    of_cells(bounds, cells, |center, side| is_hidden(&views, carves, center, side))
+}
+
+/// For each of [`RARITY_CELLS`]³ cells per cascade, in the order of [`hidden_cells`], how many times as many cameras see
+/// the middle of the best seen cell as see its own; at most 50.
+#[must_use]
+pub fn rarities(cameras: &[Camera], silhouettes: &[Silhouette], bounds: &Bounds) -> Vec<f32> {
+    let views: Vec<View<'_>> =
+        cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
+    let sees = |center| views.iter().filter(|view| view.sight(center, 0.0) != Sight::Unseen).count();
+    let counts = of_cells(bounds, RARITY_CELLS, |center, _| sees(center) as f64);
+    let most = counts.iter().copied().fold(1.0, f64::max);
+    counts.into_iter().map(|count| (most / count).min(RAREST) as f32).collect()
+}
+
+/// What `value` says of each of `cells`³ cells per cascade, of which it is told the middle and the side.
+fn of_cells<T: Send>(bounds: &Bounds, cells: u32, value: impl Fn(DVec3, f64) -> T + Sync) -> Vec<T> {
     let per_cascade = cells.pow(3);
     (0..per_cascade * bounds.cascades)
         .into_par_iter()
@@ -52,8 +75,7 @@ pub fn hidden_cells(
                 f64::from(within / cells % cells),
                 f64::from(within / (cells * cells)),
             );
-            let center = bounds.center + (corner + 0.5 - f64::from(cells) / 2.0) * side;
-            is_hidden(&views, carves, center, side)
+            value(bounds.center + (corner + 0.5 - f64::from(cells) / 2.0) * side, side)
         })
         .collect()
 }

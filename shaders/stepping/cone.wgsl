@@ -1,4 +1,4 @@
-// Needs: counters. Provides: steps that grow with the distance, between STEP_MIN and STEP_MAX, all of them times the scale;
+// Needs: counters, log. Provides: steps that grow with the distance, between STEP_MIN and STEP_MAX, all of them times the scale;
 // see `reference::march`.
 
 const STEPPING_LINEAR_END = STEP_MIN / CONE;
@@ -8,25 +8,17 @@ fn stepping_scale() -> f32 {
     return 1.0 + counters.step_excess;
 }
 
-// ln(1 + x) for x in [0, 1], by the series of the inverse hyperbolic tangent: WGSL's log is only as good as its argument
-// rounds.
-fn stepping_log(x: f32) -> f32 {
-    let y = x / (2.0 + x);
-    let square = y * y;
-    return 2.0 * y * (1.0 + square * (0.333333333 + square * (0.2 + square * (0.142857143 + square * 0.111111111))));
-}
-
 fn stepping_index(t: f32) -> f32 {
     let scale = stepping_scale();
     let middle = clamp(t, STEPPING_LINEAR_END, STEPPING_CONE_END);
     return min(t, STEPPING_LINEAR_END) / (scale * STEP_MIN)
-        + log(middle / STEPPING_LINEAR_END) / stepping_log(scale * CONE)
+        + log(middle / STEPPING_LINEAR_END) / log_one_plus(scale * CONE)
         + max(t - STEPPING_CONE_END, 0.0) / (scale * STEP_MAX);
 }
 
 fn stepping_distance(u: f32) -> f32 {
     let scale = stepping_scale();
-    let growth = stepping_log(scale * CONE);
+    let growth = log_one_plus(scale * CONE);
     let linear = 1.0 / (scale * CONE);
     let cone = log(STEP_MAX / STEP_MIN) / growth;
     if u <= linear {

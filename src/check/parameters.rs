@@ -162,8 +162,8 @@ impl Workbench {
         };
         let color_range = if self.plan.needs.hdr { ColorRange::Hdr } else { ColorRange::Ldr };
         let depth = if self.plan.needs.depth { self.plan.config.loss.depth } else { 0.0 };
-        let distortion = self.plan.config.loss.distortion;
-        let loss = Loss { is_relative: self.plan.has_relative_loss(), depth, distortion };
+        let config::Loss { distortion, sparsity, .. } = self.plan.config.loss;
+        let loss = Loss { is_relative: self.plan.has_relative_loss(), depth, distortion, sparsity };
         Objective { transmittance, color_range, loss }
     }
 }

@@ -4,7 +4,7 @@ use super::draw::Random;
 use super::tally::largest;
 use super::{Setup, Subject, Tally, Workbench};
 use crate::camera::{Camera, Lens};
-use crate::config::{Background, Optimizer, Selection};
+use crate::config::{Background, Loss, Optimizer, Selection};
 use crate::dataset::{Bounds, Photo};
 use crate::image::{Image, Pixels};
 use crate::kernels::{Needs, STEP_GROWTH, STEP_SHRINKAGE};
@@ -14,9 +14,11 @@ use crate::reference::activation::log_density;
 use crate::reference::adam::Adam;
 use crate::reference::composite::optical_depth;
 use crate::reference::model::{BatchOutput, Model, RaySample, TrainingRay};
+use crate::reference::occupancy::OccupancyShape;
 use crate::reference::step::Training;
 use crate::train::{StepStats, Trainer};
 use crate::views::Views;
+use crate::visibility::RARITY_CELLS;
 use anyhow::Result;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -33,7 +35,8 @@ pub struct TinyTraining {
 }
 
 /// What is trained, by name: plain, over random backgrounds, in the inclusive convention, with linear light and a
-/// relative loss in cascades, and with masks, depth, the distortion and 16 bits.
+/// relative loss in cascades, and with masks, depth, distortion,
+/// sparsity and 16 bits.
 #[must_use]
 pub fn setups() -> [(&'static str, Setup); 5] {
     let mut random_background = Setup::tiny().network(32, 2);
@@ -41,14 +44,14 @@ pub fn setups() -> [(&'static str, Setup); 5] {
     let mut cascades = Setup::tiny().network(32, 1).hdr(true);
     cascades.needs.cascades = 3;
     let mut masks = Setup::tiny();
-    (masks.config.loss.depth, masks.config.loss.distortion) = (0.3, 0.02);
+    masks.config.loss = Loss { depth: 0.3, distortion: 0.02, sparsity: 0.01, ..Loss::default() };
     (masks.needs.deep, masks.needs.masks, masks.needs.depth) = (true, true, true);
     [
         ("plain", Setup::tiny()),
         ("random background", random_background),
         ("inclusive", Setup::tiny().transmittance(Transmittance::Inclusive)),
         ("hdr, 3 cascades", cascades),
-        ("masks, depth, distortion, 16 bits", masks),
+        ("masks, depth, distortion, sparsity, 16 bits", masks),
     ]
 }
 
@@ -233,13 +236,19 @@ impl TinyTraining {
             true => bench.read("depth_targets", rays)?,
             false => vec![0.0; rays],
         };
+        let shape = OccupancyShape { cascades: bench.plan.needs.cascades, resolution: RARITY_CELLS };
+        let rarities: Vec<f32> = match bench.plan.config.loss.sparsity > 0.0 {
+            true => bench.read("rarities", shape.cells())?,
+            false => vec![0.0; shape.cells()],
+        };
         let scale = bench.plan.density_scale();
         let vector = |x: &[f32; 4]| DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
         let sample = |index: usize, ray: usize| {
             let position = vector(&samples[index]);
             let [origin, direction] = directions[ray].each_ref().map(vector);
             let distance = (position - origin).dot(direction) * scale;
-            RaySample { position, delta: f64::from(samples[index][3]), gains: gains[index], distance }
+            let rarity = f64::from(rarities[shape.cell(position)]);
+            RaySample { position, delta: f64::from(samples[index][3]), gains: gains[index], distance, rarity }
         };
         let stop = bench.plan.config.selection.stop_transmittance;
         let of_ray = |ray: usize| -> Vec<RaySample> {

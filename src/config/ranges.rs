@@ -57,6 +57,7 @@ impl Config {
         real("selection.stop_transmittance", selection.stop_transmittance, 0.0, 0.5)?;
         real("loss.depth", loss.depth, 0.0, 1e6)?;
         real("loss.distortion", loss.distortion, 0.0, 1e3)?;
+        real("loss.sparsity", loss.sparsity, 0.0, 1e3)?;
         real("optimizer.learning_rate", optimizer.learning_rate, 0.0, 1e3)?;
         real("optimizer.final_learning_rate", optimizer.final_learning_rate, 0.0, 1e3)?;
         real("optimizer.beta_1", optimizer.beta_1, 0.0, 0.999_999)?;

@@ -4,6 +4,7 @@ use super::{Plan, dispatch};
 use crate::config::Transmittance;
 use crate::gpu::source::Source;
 use crate::model::DENSITY_OUTPUTS;
+use crate::visibility::RARITY_CELLS;
 use std::fmt::Display;
 
 /// Dimensions of the random numbers, as the kernels draw them.
@@ -28,6 +29,9 @@ pub mod dimension {
 pub const RELATIVE_FLOOR: f64 = 0.01;
 /// Part of the photo's brightness that a rendered colour is at least taken for in relative errors.
 const RELATIVE_DARKEST: f64 = 1e-3;
+
+/// Density above which more of it costs the sparsity little, per side of the inner cube.
+const SPARSE_DENSITY: f64 = 5.0;
 
 /// Least change of the length of all steps along rays from one training step to the next.
 pub const STEP_SHRINKAGE: f64 = 0.99;
@@ -55,6 +59,7 @@ impl Plan {
             ("SAMPLES_PER_THREAD", self.product.rows),
             ("CELLS", config.occupancy.cells as usize),
             ("CELL_COUNT", self.cell_count()),
+            ("RARITY_CELLS", RARITY_CELLS as usize),
             ("CASCADES", needs.cascades as usize),
             ("CAMERA_COUNT", needs.cameras.max(1)),
             ("MAX_STEPS", config.march.most_steps),
@@ -108,6 +113,8 @@ impl Plan {
             ("RELATIVE_DARKEST", RELATIVE_DARKEST),
             ("DEPTH_WEIGHT", config.loss.depth),
             ("DISTORTION", config.loss.distortion),
+            ("SPARSITY", config.loss.sparsity),
+            ("SPARSE_DENSITY", SPARSE_DENSITY),
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         let background = config.background.solid().map(|value| value / self.needs.grey);

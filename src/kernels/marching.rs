@@ -72,7 +72,7 @@ pub fn stages_over(
 ) -> Result<Vec<Stage>> {
     let jitter = if jitter { part!("common/jitter_on.wgsl") } else { part!("common/jitter_off.wgsl") };
     let common =
-        [&[RANDOM, STEP, COUNTERS, RAY, RAY_LOAD, plan.stepping(), MARCH_START, jitter], extent.parts()];
+        [&[RANDOM, STEP, COUNTERS, RAY, RAY_LOAD, MARCH_START, jitter], plan.stepping(), extent.parts()];
     let march = [&[OCCUPANCY], common.concat().as_slice(), &[part!("march.wgsl")]].concat();
     let march = plan.kernel(gpu, "march", &march)?;
     let samples = [common.concat().as_slice(), &[part!("samples.wgsl")]].concat();

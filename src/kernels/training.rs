@@ -15,6 +15,7 @@ use crate::gpu::pass::{Size, Stage};
 use crate::gpu::tensor::{Element, Memory};
 use crate::gpu_struct;
 use crate::model::{DENSITY_OUTPUTS, Layer};
+use crate::visibility::RARITY_CELLS;
 use anyhow::Result;
 
 gpu_struct! {
@@ -63,6 +64,10 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     demands.extend(of_rays.map(|name| Demand::storage::<[f32; 4]>(name, batch.rays)));
     let of_weights = ["mlp_first", "mlp_second", "d_weights"];
     demands.extend(of_weights.map(|name| Demand::storage::<[f32; 4]>(name, layout.quads)));
+    if plan.config.loss.sparsity > 0.0 {
+        let cells = plan.needs.cascades as usize * (RARITY_CELLS as usize).pow(3);
+        demands.push(Demand::storage::<f32>("rarities", cells));
+    }
     if plan.needs.depth {
         demands.push(Demand::storage::<f32>("depth_targets", batch.rays));
     }
@@ -108,6 +113,7 @@ pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -
         weights,
         part!("composite.wgsl"),
     ];
+    parts.extend(plan.sparsity());
     if plan.needs.depth || plan.config.loss.distortion > 0.0 {
         parts.extend([RAY, RAY_LOAD, part!("common/kept_distance.wgsl")]);
     }

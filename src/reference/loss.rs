@@ -1,10 +1,13 @@
-//! What is minimised over a ray: errors of colour and opacity with their weights, of the depth, and the distortion.
+//! What is minimised over a ray: errors of colour and opacity with their weights, of the depth, the distortion
+//! and the sparsity.
 //!
 //! ```text
-//! loss = 1/(4M) Σ_x v_x e'_x e''_x  +  λ_t/M D²  +  λ_x/M X       e' = R' − g,  e'' = R'' − g
+//! loss = 1/(4M) Σ_x v_x e'_x e''_x  +  λ_t/M D²  +  λ_x/M X  +  λ_s/M S
+//! e' = R' − g,  e'' = R'' − g
 //! v_x  = 1                     squared, and always for the opacity
 //! v_x  = 1 / (max(R_x, g_x/1000) max(R_x, g_x) + 0.01)     relative; a constant as far as gradients go
 //! D    = Σ_i ω_i (t_i − g_t)
+//! S    = Σ_i γ_i ν_i T_i^(1/8) δ_i ln(1 + σ_i/σ_0)       γ = (g' + g'')/2
 //! X    = Σ_ij ω_i ω_j |x_i − x_j| + 1/3 Σ_i ω_i² Δ_i       x = t/(1 + t),  Δ = δ/(1 + t)²
 //! ```
 //!
@@ -14,6 +17,7 @@
 //! ```text
 //! d_c_xi = v_x/(4M) (ω'_i e''_x + ω''_i e'_x)
 //! d_s_i  = Σ_x v_x/(4M) (e''_x dR'_x/ds_i + e'_x dR''_x/ds_i)  +  2 λ_t/M D dD/ds_i  +  λ_x/M Σ_j dX/dω_j dω_j/ds_i
+//!          +  λ_s/M γ_i ν_i T_i^(1/8) δ_i σ_i/(σ_0 + σ_i)
 //! dX/dω_j = 2 Σ_k ω_k |x_j − x_k| + 2/3 ω_j Δ_j
 //! ```
 //!
@@ -30,9 +34,14 @@
 //! `X` is the distortion of Barron et al. 2022 (Mip-NeRF 360, eq. 15), which pulls the weights of a ray together. Its
 //! derivative is that of a colour `dX/dω_j` over 0, taken as a constant. Distances `t` and steps `δ` are in sides of the
 //! inner cube, and `x` orders what lies far away in a finite range.
+//!
+//! `S` is a prior for empty space in the form of Hedman et al. 2021 (SNeRG, eq. 4) with the logarithm of the density where
+//! they have that of its square. `ν`, the rarity, says how many times as many cameras see the best seen place: what fills
+//! places that few cameras see must be worth it. `ν` and `T^(1/8)` are constants as far as gradients go. The latter lets
+//! what is in front pay a little more: without it, surfaces without texture come out too near, with `T^(1/2)` too far.
 
 use super::Transmittance;
-use super::composite::{CompositeInput, CompositeOutput, composite};
+use super::composite::{CompositeInput, CompositeOutput, composite, optical_depths, transmittances};
 use super::selection::{Estimate, thin};
 
 /// Added to the squared colour that an error is relative to.
@@ -40,6 +49,9 @@ pub const RELATIVE_FLOOR: f64 = 0.01;
 
 /// Part of the target's brightness that a rendered colour is at least taken for.
 pub const DARKEST: f64 = 1e-3;
+
+/// `σ_0`: density above which more of it costs little, per side of the inner cube.
+pub const SPARSE_DENSITY: f64 = 5.0;
 
 /// How errors count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -50,6 +62,8 @@ pub struct Loss {
     pub depth: f64,
     /// `λ_x`, the weight of the distortion.
     pub distortion: f64,
+    /// `λ_s`, the weight of the sparsity.
+    pub sparsity: f64,
 }
 
 /// Where the samples of a ray lie, in sides of the inner cube.
@@ -59,6 +73,8 @@ pub struct Places<'a> {
     pub distances: &'a [f64],
     /// `g_t`, where something is known to be; 0 where nothing is.
     pub depth: f64,
+    /// `ν_i`, `[samples]`; empty where the loss has no sparsity.
+    pub rarities: &'a [f64],
 }
 
 impl Loss {
@@ -104,6 +120,16 @@ pub fn composite_with(
         let (distortion, slopes) = distortion(&weights, places.distances, ray.delta);
         output.loss += loss.distortion / m * distortion;
         thinned.add_slopes(loss.distortion / m, &slopes, &mut output);
+    }
+    if loss.sparsity > 0.0 {
+        let depths = optical_depths(ray);
+        let in_front = transmittances(convention, &depths);
+        for i in 0..depths.len() {
+            let part = loss.sparsity / m * thinned.gains[i] * places.rarities[i] * in_front[i].powf(0.125);
+            let relative = ray.s[i].exp() / SPARSE_DENSITY;
+            output.loss += part * ray.delta[i] * relative.ln_1p();
+            output.d_s[i] += part * ray.delta[i] * relative / (1.0 + relative);
+        }
     }
     output
 }
@@ -201,11 +227,12 @@ mod tests {
         terms.sum::<f64>() / (4.0 * m) + (loss.depth * depth * depth + loss.distortion * distortion) / m
     }
 
-    const PLACES: Places = Places { distances: &[1.0 / 3.0, 1.0, 1.5], depth: 0.7 };
+    const PLACES: Places =
+        Places { distances: &[1.0 / 3.0, 1.0, 1.5], depth: 0.7, rarities: &[1.0, 3.0, 50.0] };
 
     #[test]
     fn gradients_are_slopes() {
-        let loss = Loss { is_relative: true, depth: 0.7, distortion: 0.4 };
+        let loss = Loss { is_relative: true, depth: 0.7, distortion: 0.4, sparsity: 0.0 };
         for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
             let output = composite_with(loss, convention, &RAY, PLACES, &[]);
             let weights = loss.weights(output.rendered, RAY.target);
@@ -251,7 +278,7 @@ mod tests {
     #[test]
     fn only_what_is_there_has_a_depth() {
         let loss = Loss { depth: 2.0, ..Loss::default() };
-        let places = Places { distances: &[0.9], depth: 0.7 };
+        let places = Places { distances: &[0.9], depth: 0.7, rarities: &[] };
         let ray = |s: &'static [f64]| CompositeInput {
             s,
             delta: &[1.0],
@@ -263,6 +290,29 @@ mod tests {
         let of = |s| composite_with(loss, Transmittance::Exclusive, &ray(s), places, &[]);
         assert!((of(&[10.0]).loss - 2.0 * 0.04).abs() < 1e-12);
         assert!((of(&[-50.0]).loss - 0.25).abs() < 1e-12);
+    }
+
+    /// Its gradient is the slope of the sum in which the transmittances are those of the undisturbed ray.
+    #[test]
+    fn sparsity_is_a_sum_over_densities() {
+        let loss = Loss { sparsity: 0.6, ..Loss::default() };
+        let gains = [[2.0, 0.0], [0.0, 5.0], [1.0, 1.0]];
+        for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
+            let with = composite_with(loss, convention, &RAY, PLACES, &gains);
+            let without = composite_with(Loss::default(), convention, &RAY, PLACES, &gains);
+            let constants = transmittances(convention, &optical_depths(&RAY));
+            let part = |i: usize, s: f64| {
+                let gain = [1.0, 2.5, 1.0][i];
+                let place = [1.0, 3.0, 50.0][i] * constants[i].sqrt().sqrt().sqrt();
+                0.6 / 3.0 * gain * place * RAY.delta[i] * (1.0 + s.exp() / 5.0).ln()
+            };
+            let sum: f64 = (0..3).map(|i| part(i, RAY.s[i])).sum();
+            assert!((with.loss - without.loss - sum).abs() < 1e-12);
+            for i in 0..3 {
+                let slope = (part(i, RAY.s[i] + 1e-5) - part(i, RAY.s[i] - 1e-5)) / 2e-5;
+                assert!((with.d_s[i] - without.d_s[i] - slope).abs() < 1e-9, "{slope}");
+            }
+        }
     }
 
     /// Two halves at x = 1/2 and 3/4, and one alone.

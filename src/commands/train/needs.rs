@@ -89,6 +89,7 @@ pub(in crate::commands) fn left_out(needs: &Needs, config: &Config) -> Vec<Strin
         (!needs.masks, "masks (there are none)"),
         (!needs.depth, "depth (loss.depth is 0)"),
         (config.loss.distortion == 0.0, "the distortion loss (loss.distortion is 0)"),
+        (config.loss.sparsity == 0.0, "the sparsity loss (loss.sparsity is 0)"),
         (config.background != Background::Random, "random backgrounds (not asked for)"),
     ];
     let absent = LensKind::ALL.into_iter().filter(|kind| !needs.lenses.contains(kind));

@@ -113,7 +113,8 @@ impl Device {
                     position: DVec3::ZERO,
                     delta: ray.delta,
                     gains: [1.0; 2],
-                    distance: 0.0
+                    distance: 0.0,
+                    rarity: 0.0,
                 };
                 ray.s.len()
             ],
