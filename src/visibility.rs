@@ -193,6 +193,37 @@ mod tests {
         }
     }
 
+    /// Two cameras that look at the centre from two sides: it is seen by both, the room to either side by one, and what
+    /// lies behind both by none.
+    #[test]
+    fn places_are_as_rare_as_cameras_are_few() {
+        let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades: 2, source: String::new() };
+        let looking = |back: DVec3| Camera {
+            center_px: DVec2::splat(32.0),
+            world_from_camera: DAffine3::from_mat3_translation(
+                DMat3::from_cols(DVec3::Z.cross(back), back.cross(DVec3::Z.cross(back)), back),
+                back * 1.9,
+            ),
+            ..camera(Lens::Pinhole)
+        };
+        let views = [looking(DVec3::X), looking(DVec3::Y)];
+        let opaque = Image {
+            width: SIZE,
+            height: SIZE,
+            has_alpha: false,
+            pixels: Pixels::Srgb8(vec![[255; 4]; (SIZE * SIZE) as usize]),
+        };
+        let silhouette = Silhouette::of(&opaque.into());
+        let found = rarities(&views, &[silhouette.clone(), silhouette], &bounds);
+        let n = RARITY_CELLS as usize;
+        let at = |cascade: usize, x: usize, y: usize, z: usize| found[((cascade * n + z) * n + y) * n + x];
+        assert_eq!(found.len(), 2 * n.pow(3));
+        assert_eq!(at(0, n / 2, n / 2, n / 2), 1.0);
+        assert_eq!(at(1, n - 2, n / 2, n / 2), 2.0);
+        assert_eq!(at(1, n / 2, n - 2, n / 2), 2.0);
+        assert_eq!(f64::from(at(1, n - 1, n - 1, n / 2)), RAREST);
+    }
+
     /// No cell that a pixel's ray goes through before it meets anything opaque may be taken for hidden.
     #[test]
     fn cells_on_rays_are_seen_through_every_lens() {

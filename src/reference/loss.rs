@@ -123,9 +123,8 @@ pub fn composite_with(
     }
     if loss.sparsity > 0.0 {
         let depths = optical_depths(ray);
-        let in_front = transmittances(convention, &depths);
-        for i in 0..depths.len() {
-            let part = loss.sparsity / m * thinned.gains[i] * places.rarities[i] * in_front[i].powf(0.125);
+        for (i, in_front) in transmittances(convention, &depths).into_iter().enumerate() {
+            let part = loss.sparsity / m * thinned.gains[i] * places.rarities[i] * in_front.powf(0.125);
             let relative = ray.s[i].exp() / SPARSE_DENSITY;
             output.loss += part * ray.delta[i] * relative.ln_1p();
             output.d_s[i] += part * ray.delta[i] * relative / (1.0 + relative);
@@ -308,8 +307,8 @@ mod tests {
             };
             let sum: f64 = (0..3).map(|i| part(i, RAY.s[i])).sum();
             assert!((with.loss - without.loss - sum).abs() < 1e-12);
-            for i in 0..3 {
-                let slope = (part(i, RAY.s[i] + 1e-5) - part(i, RAY.s[i] - 1e-5)) / 2e-5;
+            for (i, s) in RAY.s.iter().enumerate() {
+                let slope = (part(i, s + 1e-5) - part(i, s - 1e-5)) / 2e-5;
                 assert!((with.d_s[i] - without.d_s[i] - slope).abs() < 1e-9, "{slope}");
             }
         }
