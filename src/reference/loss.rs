@@ -35,7 +35,7 @@
 //! derivative is that of a colour `dX/dω_j` over 0, taken as a constant. Distances `t` and steps `δ` are in sides of the
 //! inner cube, and `x` orders what lies far away in a finite range.
 //!
-//! `S` is a prior for empty space in the form of Hedman et al. 2021 (SNeRG, eq. 4) with the logarithm of the density where
+//! `S` is a prior for empty space in the form of Hedman et al. 2021 (SNeRG) with the logarithm of the density where
 //! they have that of its square. `ν`, the rarity, says how many times as many cameras see the best seen place: what fills
 //! places that few cameras see must be worth it. `ν` and `T^(1/8)` are constants as far as gradients go. The latter lets
 //! what is in front pay a little more: without it, surfaces without texture come out too near, with `T^(1/2)` too far.
