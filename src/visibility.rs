@@ -44,8 +44,7 @@ pub fn hidden_cells(
     bounds: &Bounds,
     cells: u32,
 ) -> Vec<bool> {
-    let views: Vec<View<'_>> =
-        cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
+    let views = View::of_all(cameras, silhouettes);
     let carves = views.iter().any(|view| !view.silhouette.is_opaque());
     of_cells(bounds, cells, |center, side| is_hidden(&views, carves, center, side))
 }
@@ -54,8 +53,7 @@ pub fn hidden_cells(
 /// the middle of the best seen cell as see its own; at most 50.
 #[must_use]
 pub fn rarities(cameras: &[Camera], silhouettes: &[Silhouette], bounds: &Bounds) -> Vec<f32> {
-    let views: Vec<View<'_>> =
-        cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
+    let views = View::of_all(cameras, silhouettes);
     let sees = |center| views.iter().filter(|view| view.sight(center, 0.0) != Sight::Unseen).count();
     let counts = of_cells(bounds, RARITY_CELLS, |center, _| sees(center) as f64);
     let most = counts.iter().copied().fold(1.0, f64::max);
@@ -109,6 +107,10 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
+    fn of_all(cameras: &'a [Camera], silhouettes: &'a [Silhouette]) -> Vec<Self> {
+        cameras.iter().zip(silhouettes).map(|(camera, silhouette)| Self::new(camera, silhouette)).collect()
+    }
+
     fn new(camera: &'a Camera, silhouette: &'a Silhouette) -> Self {
         Self { camera, half_angle: half_angle(camera), silhouette }
     }

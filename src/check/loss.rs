@@ -1,13 +1,13 @@
-//! The fused kernel with everything that a loss may have: errors relative to the colour, depth, the distortion and the sparsity.
+//! The fused kernel with everything that a loss may have: errors relative to the colour, depth, distortion and sparsity.
 
 use super::draw::Random;
 use super::{Setup, Subject, Tally};
 use crate::config::{ColorLoss, Loss};
 use crate::kernels::{Counters, training};
+use crate::reference::Transmittance;
 use crate::reference::composite::{CompositeInput, CompositeOutput, optical_depths};
-use crate::reference::loss::{Places, composite_with, distortion};
+use crate::reference::loss::{Places, composite_with, distortion, sparsity};
 use crate::reference::model::Objective;
-use crate::reference::{self, Transmittance};
 use anyhow::Result;
 use std::iter::repeat_n;
 
@@ -223,13 +223,12 @@ impl Scales {
         let apart = SizeOfDistortion::new(ray, output, places);
         let shares = [residual.as_slice(), &[2.0 * loss.depth / m * depth, loss.distortion / m]].concat();
         // All terms of the sparsity have one sign.
-        let sparse = reference::loss::Loss { sparsity: loss.sparsity, ..Default::default() };
-        let sparse = composite_with(sparse, objective.transmittance, ray, places, &[]);
-        let plain =
-            composite_with(reference::loss::Loss::default(), objective.transmittance, ray, places, &[]);
+        let all = vec![1.0; ray.s.len()];
+        let (sparse, by_sparsity) = sparsity(objective.transmittance, ray, places.rarities, &all);
+        let sparsity_share = loss.sparsity / m;
         let loss = (0..4).map(|x| residual[x] * both(x) / 2.0).sum::<f64>()
             + (loss.depth * depth.powi(2) + loss.distortion * apart.sum) / m
-            + (sparse.loss - plain.loss);
+            + sparsity_share * sparse;
         let depths = optical_depths(ray);
         let mut behind = [ray.background[0], ray.background[1], ray.background[2], 0.0, 0.0, 0.0]
             .map(|background| output.transmittance_end * background);
@@ -239,8 +238,8 @@ impl Scales {
             let channels = [r, g, b, 1.0, offsets[i], apart.slopes[i]];
             let passing = (-depths[..=i].iter().sum::<f64>()).exp();
             let term = |x: usize| behind[x] + (passing + output.weights[i]) * channels[x].abs();
-            let by_sparsity = (sparse.d_s[i] - plain.d_s[i]).abs();
-            d_s[i] = by_sparsity + depths[i] * (0..6).map(|x| shares[x] * term(x)).sum::<f64>();
+            d_s[i] = sparsity_share * by_sparsity[i]
+                + depths[i] * (0..6).map(|x| shares[x] * term(x)).sum::<f64>();
             (0..6).for_each(|x| behind[x] += output.weights[i] * channels[x].abs());
         }
         Self { residual, loss, d_s }

@@ -35,8 +35,8 @@ pub struct TinyTraining {
 }
 
 /// What is trained, by name: plain, over random backgrounds, in the inclusive convention, with linear light and a
-/// relative loss in cascades, and with masks, depth, distortion,
-/// sparsity and 16 bits.
+/// relative loss in cascades, and with masks, depth,
+/// distortion, sparsity and 16 bits.
 #[must_use]
 pub fn setups() -> [(&'static str, Setup); 5] {
     let mut random_background = Setup::tiny().network(32, 2);

@@ -122,13 +122,9 @@ pub fn composite_with(
         thinned.add_slopes(loss.distortion / m, &slopes, &mut output);
     }
     if loss.sparsity > 0.0 {
-        let depths = optical_depths(ray);
-        for (i, in_front) in transmittances(convention, &depths).into_iter().enumerate() {
-            let part = loss.sparsity / m * thinned.gains[i] * places.rarities[i] * in_front.powf(0.125);
-            let relative = ray.s[i].exp() / SPARSE_DENSITY;
-            output.loss += part * ray.delta[i] * relative.ln_1p();
-            output.d_s[i] += part * ray.delta[i] * relative / (1.0 + relative);
-        }
+        let (sparsity, slopes) = sparsity(convention, ray, places.rarities, &thinned.gains);
+        output.loss += loss.sparsity / m * sparsity;
+        output.d_s.iter_mut().zip(slopes).for_each(|(d_s, slope)| *d_s += loss.sparsity / m * slope);
     }
     output
 }
@@ -187,6 +183,21 @@ pub fn distortion(weights: &[f64], distances: &[f64], delta: &[f64]) -> (f64, Ve
     let apart = |i: usize| weights.iter().zip(&x).map(|(w, other)| w * (x[i] - other).abs()).sum::<f64>();
     let terms = (0..x.len()).map(|i| weights[i] * (apart(i) + weights[i] * width[i] / 3.0));
     let slopes = (0..x.len()).map(|i| 2.0 * apart(i) + 2.0 / 3.0 * weights[i] * width[i]);
+    (terms.sum(), slopes.collect())
+}
+
+/// `S` of a ray whose samples have these rarities and mean gains, and its slopes by their log-densities.
+pub fn sparsity(
+    convention: Transmittance,
+    ray: &CompositeInput,
+    rarities: &[f64],
+    gains: &[f64],
+) -> (f64, Vec<f64>) {
+    let in_front = transmittances(convention, &optical_depths(ray));
+    let factor = |i: usize| gains[i] * rarities[i] * in_front[i].powf(0.125) * ray.delta[i];
+    let relative = |i: usize| ray.s[i].exp() / SPARSE_DENSITY;
+    let terms = (0..ray.s.len()).map(|i| factor(i) * relative(i).ln_1p());
+    let slopes = (0..ray.s.len()).map(|i| factor(i) * relative(i) / (1.0 + relative(i)));
     (terms.sum(), slopes.collect())
 }
 
