@@ -79,7 +79,7 @@ impl Trainer {
             (0..).zip(&hidden).filter(|(_, hidden)| !**hidden).map(|(cell, _)| cell).collect();
         let mut workspace = Workspace::for_training(gpu, &plan, &visible)?;
         if plan.config.loss.sparsity > 0.0 {
-            workspace.write(gpu, "rarities", &rarities(&views.cameras, &views.silhouettes, &views.bounds));
+            workspace.write(gpu, "rarities", &rarities(views.drawn(), &views.bounds));
         }
         workspace.add(gpu.storage_with("cameras", &views.on_device)?);
         workspace.add_banks(views.banks);

@@ -44,7 +44,8 @@ pub fn hidden_cells(
     bounds: &Bounds,
     cells: u32,
 ) -> Vec<bool> {
-    let views = View::of_all(cameras, silhouettes);
+    let views: Vec<_> =
+        cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
     let carves = views.iter().any(|view| !view.silhouette.is_opaque());
     of_cells(bounds, cells, |center, side| is_hidden(&views, carves, center, side))
 }
@@ -52,8 +53,11 @@ pub fn hidden_cells(
 /// For each of [`RARITY_CELLS`]³ cells per cascade, in the order of [`hidden_cells`], how many times as many cameras see
 /// the middle of the best seen cell as see its own; at most 50.
 #[must_use]
-pub fn rarities(cameras: &[Camera], silhouettes: &[Silhouette], bounds: &Bounds) -> Vec<f32> {
-    let views = View::of_all(cameras, silhouettes);
+pub fn rarities<'a>(
+    looking: impl Iterator<Item = (&'a Camera, &'a Silhouette)>,
+    bounds: &Bounds,
+) -> Vec<f32> {
+    let views: Vec<_> = looking.map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
     let sees = |center| views.iter().filter(|view| view.sight(center, 0.0) != Sight::Unseen).count();
     let counts = of_cells(bounds, RARITY_CELLS, |center, _| sees(center) as f64);
     let most = counts.iter().copied().fold(1.0, f64::max);
@@ -107,10 +111,6 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    fn of_all(cameras: &'a [Camera], silhouettes: &'a [Silhouette]) -> Vec<Self> {
-        cameras.iter().zip(silhouettes).map(|(camera, silhouette)| Self::new(camera, silhouette)).collect()
-    }
-
     fn new(camera: &'a Camera, silhouette: &'a Silhouette) -> Self {
         Self { camera, half_angle: half_angle(camera), silhouette }
     }
@@ -216,7 +216,7 @@ mod tests {
             pixels: Pixels::Srgb8(vec![[255; 4]; (SIZE * SIZE) as usize]),
         };
         let silhouette = Silhouette::of(&opaque.into());
-        let found = rarities(&views, &[silhouette.clone(), silhouette], &bounds);
+        let found = rarities(views.iter().map(|camera| (camera, &silhouette)), &bounds);
         let n = RARITY_CELLS as usize;
         let at = |cascade: usize, x: usize, y: usize, z: usize| found[((cascade * n + z) * n + y) * n + x];
         assert_eq!(found.len(), 2 * n.pow(3));

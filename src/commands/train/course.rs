@@ -112,7 +112,7 @@ impl<'a> Course<'a> {
         if stats.samples == 0 && !self.is_empty {
             progress.say(&format!(
                 "warning: at step {step} the rays meet nothing any more, the field has become empty; try a smaller \
-                 optimizer.learning_rate or occupancy.threshold"
+                 optimizer.learning_rate, occupancy.threshold or loss.sparsity"
             ));
         }
         self.is_empty = stats.samples == 0;
