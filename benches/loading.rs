@@ -88,7 +88,7 @@ fn load(folder: &Path, count: usize) -> Result<()> {
     let cameras: Vec<Camera> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
     let gpu = Arc::new(Gpu::open(&adapter::choose(None)?)?);
     let cascades = dataset.bounds.cascades;
-    let config = if gpu.is_cpu() { Config::for_cpu(cascades > 1)? } else { Config::default() };
+    let config = Config::preset(gpu.is_cpu(), cascades > 1)?;
     let layout = Layout::new(&config, finest_resolution(&config.grid, &dataset.bounds, &cameras));
     let lenses = LensKind::among(&cameras);
     let needs = Needs { lenses, cascades, cameras: cameras.len(), ..Needs::default() };

@@ -9,7 +9,7 @@
 
 var<storage, read> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
-// Log-density, step length, optical depth left out in front of the sample, and rarity of its place.
+// Log-density, step length, and optical depth left out in front of the sample.
 tensor<read> kept_steps: vec4<f32>;
 // How many times its own weight a sample's colour has in both estimates.
 tensor<read> kept_gains: vec2<f32>;

@@ -63,6 +63,19 @@ impl Camera {
         Some((plane * self.focal_px + self.center_px, depth))
     }
 
+    /// The world-space point at a depth, in world units, behind a point of the image: [`Camera::project`] backwards.
+    pub fn point(&self, pixel: DVec2, depth: f64) -> Option<DVec3> {
+        let ray = self.ray(pixel)?;
+        let along = if self.lens.depth_is_distance() { 1.0 } else { ray.direction.dot(self.forward()) };
+        Some(ray.origin + ray.direction * (depth / along))
+    }
+
+    /// Whether a world-space point appears within the image, were nothing in between.
+    pub fn has_in_picture(&self, world: DVec3) -> bool {
+        let size = DVec2::new(f64::from(self.width), f64::from(self.height));
+        self.project(world).is_some_and(|(at, _)| at.cmpge(DVec2::ZERO).all() && at.cmple(size).all())
+    }
+
     /// How many pixels a world unit across the view covers at `distance` from the camera, near the view axis.
     pub fn pixels_per_length(&self, distance: f64) -> f64 {
         let focal_px = self.focal_px.max_element();
@@ -185,6 +198,9 @@ mod tests {
                 assert!(back.distance(pixel) < 1e-6, "{lens:?} {pixel} -> {back}");
                 let along = if lens.depth_is_distance() { 1.0 } else { ray.direction.dot(camera.forward()) };
                 assert!((depth - 7.0 * along).abs() < 1e-12, "{lens:?} {depth}");
+                let point = camera.point(pixel, depth).expect("the same ray");
+                assert!(point.distance(ray.origin + 7.0 * ray.direction) < 1e-11, "{lens:?} {point}");
+                assert!(camera.has_in_picture(point), "{lens:?} {pixel}");
             }
             let found = f64::from(seen) / f64::from(count);
             assert!(found <= share && found > share - 0.2, "{lens:?}: {found} of the pixels have rays");

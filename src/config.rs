@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;
 
-/// The whole configuration. `Config::default()` suits a GPU; [`Config::for_cpu`] a software adapter.
+/// The whole configuration. `Config::default()` suits objects on a GPU; [`Config::preset`] knows the others.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
@@ -137,7 +137,7 @@ pub struct Loss {
     pub depth: f64,
     /// Weight of the distortion (Barron et al. 2022), which pulls the weights along a ray together; 0 leaves it out.
     pub distortion: f64,
-    /// Weight of the sparsity, which clears what is thin, first where few cameras look; 0 leaves it out.
+    /// Weight of the sparsity, which clears what surfaces hide; 0 leaves it out.
     pub sparsity: f64,
 }
 
@@ -273,20 +273,22 @@ impl Default for Optimizer {
     }
 }
 
+const CAPTURE_PRESET: &str = include_str!("../configs/capture.json");
 const CPU_PRESET: &str = include_str!("../configs/cpu.json");
 const CPU_CAPTURE_PRESET: &str = include_str!("../configs/cpu_capture.json");
 
 impl Config {
-    /// The defaults for a software adapter: a smaller table, batch and network, and longer steps in a capture
-    /// whose box is larger than the inner cube.
+    /// The defaults for an adapter and a scene. A capture, whose box is larger than the inner cube, has losses that keep
+    /// its surfaces in place; a software adapter has a smaller table, batch and network, and longer steps in a capture.
     ///
     /// # Errors
     /// Never for the presets that are compiled in, which the tests read.
-    pub fn for_cpu(is_capture: bool) -> Result<Self> {
+    pub fn preset(is_cpu: bool, is_capture: bool) -> Result<Self> {
         let mut config = Self::default();
-        let presets = [CPU_PRESET, CPU_CAPTURE_PRESET];
-        for preset in &presets[..1 + usize::from(is_capture)] {
-            let changes = serde_json::from_str(preset).context("reading the preset for CPU adapters")?;
+        let presets =
+            [(is_capture, CAPTURE_PRESET), (is_cpu, CPU_PRESET), (is_cpu && is_capture, CPU_CAPTURE_PRESET)];
+        for (_, preset) in presets.into_iter().filter(|(is_used, _)| *is_used) {
+            let changes = serde_json::from_str(preset).context("reading a preset")?;
             config.merge(&changes)?;
         }
         Ok(config)

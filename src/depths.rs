@@ -4,12 +4,18 @@
 //! ([`Dataset::focus`](crate::dataset::Dataset::focus)). Depth is compared with it as the lens defines it
 //! ([`LensKind::depth_is_distance`](crate::camera::LensKind::depth_is_distance)).
 
+mod onlookers;
+
+use crate::camera::Camera;
 use crate::dataset::focus::median;
 use crate::render::View;
 use crate::words::percent;
+use glam::DVec2;
+pub use onlookers::Onlookers;
 use std::iter::Sum;
 
-/// Surfaces below this relative distance are near.
+/// Surfaces below this relative distance are near, if few cameras have them in their picture: where many do, something
+/// is there, as a table that cameras look down on, whose axes cross below it.
 pub const NEAR: f64 = 0.5;
 /// Share of near pixels above which a field is likely to be fog.
 pub const FOG: f64 = 0.05;
@@ -25,7 +31,7 @@ const BINS: usize = (2 * OCTAVES * BINS_PER_OCTAVE) as usize;
 pub struct Depths {
     /// Pixels, those that show nothing included.
     pixels: u64,
-    /// Pixels with a surface that is near.
+    /// Pixels with a surface that is near and has few onlookers.
     near: u64,
     /// Sum of the opacities of the pixels in each bin; what lies beyond the outermost ones is in them.
     opacities: [f64; BINS],
@@ -47,10 +53,16 @@ impl Default for Depths {
 }
 
 impl Depths {
-    /// Those of a view whose camera is `unit` world units away from the focus, without the pixels that are
-    /// `ignored` (none where that is empty). A pixel's opacity counts at its mean depth.
+    /// Those of a view of `camera`, without the pixels that are `ignored` (none where that is empty). A pixel's
+    /// opacity counts at its mean depth.
     #[must_use]
-    pub fn of(view: &View, ignored: &[bool], unit: f64) -> Self {
+    pub fn of(view: &View, camera: &Camera, ignored: &[bool], onlookers: &Onlookers) -> Self {
+        let unit = onlookers.distance(camera);
+        let is_alone = |pixel: usize, z: f32| {
+            let [x, y] = [pixel % view.width as usize, pixel / view.width as usize];
+            let place = camera.point(DVec2::new(x as f64 + 0.5, y as f64 + 0.5), f64::from(z));
+            place.is_some_and(|place| onlookers.are_few(place))
+        };
         let mut depths = Self::default();
         for (pixel, (&z, color)) in view.depth.iter().zip(&view.color).enumerate() {
             if ignored.get(pixel) == Some(&true) {
@@ -59,14 +71,15 @@ impl Depths {
             depths.pixels += 1;
             if z > 0.0 {
                 let distance = f64::from(z) / unit;
-                depths.near += u64::from(distance < NEAR);
+                depths.near += u64::from(distance < NEAR && is_alone(pixel, z));
                 depths.opacities[bin(distance)] += f64::from(color[3]);
             }
         }
         depths
     }
 
-    /// Part of the pixels that show a surface below the relative distance [`NEAR`]; `None` without pixels.
+    /// Part of the pixels that show a surface below the relative distance [`NEAR`] with few onlookers; `None` without
+    /// pixels.
     #[must_use]
     pub fn near_share(&self) -> Option<f64> {
         (self.pixels > 0).then(|| self.near as f64 / self.pixels as f64)
@@ -118,8 +131,9 @@ pub fn fog(near_share: f64) -> Option<String> {
     (near_share > FOG).then(|| {
         format!(
             "surfaces seem to hang right in front of the cameras: {} of the pixels measured show something nearer \
-             than half the way to what the cameras look at. Unless the scene really has something there, the photos are \
-             painted onto fog near each lens, and other views show that fog. Check the poses with `nerf info`; photos \
+             than half the way to what the cameras look at, which few other cameras have in their picture. Unless the \
+             scene really has something there, the photos are painted onto fog near each lens, and other views show \
+             that fog. Check the poses with `nerf info`; photos \
              from more directions and a longer training may help, and so may a larger march.near, the distance from \
              the camera within which nothing is sampled",
             percent(near_share)
@@ -130,6 +144,37 @@ pub fn fog(near_share: f64) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Lens;
+    use glam::{DAffine3, DVec3};
+
+    /// A camera of so many pixels side by side that looks down -z from `back` behind the origin, straight through the
+    /// middle of all of them.
+    fn camera(width: usize, back: f64) -> Camera {
+        Camera {
+            width: width as u32,
+            height: 1,
+            focal_px: DVec2::splat(1e6),
+            center_px: DVec2::new(width as f64 / 2.0, 0.5),
+            lens: Lens::Pinhole,
+            world_from_camera: DAffine3::from_translation(DVec3::new(0.0, 0.0, back)),
+        }
+    }
+
+    /// The depths of a view from four units away from the focus, where all others look from the side.
+    fn alone(view: &View, ignored: &[bool]) -> Depths {
+        let sides = (0..9).map(|number| Camera {
+            width: 100,
+            height: 100,
+            focal_px: DVec2::splat(100.0),
+            center_px: DVec2::splat(50.0),
+            world_from_camera: DAffine3::from_rotation_y(1.2 + 0.05 * f64::from(number))
+                * DAffine3::from_translation(DVec3::new(0.0, 0.0, 4.0)),
+            ..camera(100, 4.0)
+        });
+        let own = camera(view.width as usize, 4.0);
+        let all: Vec<_> = sides.chain([own.clone()]).collect();
+        Depths::of(view, &own, ignored, &Onlookers::around(DVec3::ZERO, &all))
+    }
 
     /// Pixels of these depths and opacities.
     fn view(pixels: &[(f32, f32)]) -> View {
@@ -144,18 +189,30 @@ mod tests {
     #[test]
     fn surfaces_before_half_the_way_are_near() {
         let view = view(&[(1.9, 1.0), (2.0, 1.0), (4.0, 0.5), (0.0, 0.0), (0.1, 0.002)]);
-        assert_eq!(Depths::of(&view, &[], 4.0).near_share(), Some(0.4));
+        assert_eq!(alone(&view, &[]).near_share(), Some(0.4));
         let ignored = [true, false, false, false, true];
-        assert_eq!(Depths::of(&view, &ignored, 4.0).near_share(), Some(0.0));
-        assert_eq!(Depths::of(&view, &[true; 5], 4.0).near_share(), None);
-        let views = [Depths::of(&view, &[], 4.0), Depths::of(&view, &ignored, 4.0)];
+        assert_eq!(alone(&view, &ignored).near_share(), Some(0.0));
+        assert_eq!(alone(&view, &[true; 5]).near_share(), None);
+        let views = [alone(&view, &[]), alone(&view, &ignored)];
         assert_eq!(views.iter().sum::<Depths>().near_share(), Some(0.25), "of all pixels, not of all views");
+    }
+
+    #[test]
+    fn what_many_see_is_not_near() {
+        let view = view(&[(1.9, 1.0), (0.1, 1.0)]);
+        let own = camera(2, 4.0);
+        // All stand beside one another: each sees what is near to any.
+        let crowd = vec![own.clone(); 7];
+        let near = |cameras: &[Camera]| {
+            Depths::of(&view, &own, &[], &Onlookers::around(DVec3::ZERO, cameras)).near_share()
+        };
+        assert_eq!(near(&crowd), Some(0.0));
     }
 
     #[test]
     fn opacity_is_found_at_its_distance() {
         let pixels = [(0.001, 1.0), (3.9, 0.5), (4.1, 0.25), (1e9, 1.25), (0.0, 0.9)];
-        let bins = Depths::of(&view(&pixels), &[], 4.0).distribution();
+        let bins = alone(&view(&pixels), &[]).distribution();
         let at = |distance: f64| {
             let is_there = |bin: &&Bin| bin.distances[0] <= distance && distance < bin.distances[1];
             bins.iter().find(is_there).expect("a bin").share
@@ -168,12 +225,14 @@ mod tests {
             "the outermost have what lies beyond"
         );
         assert!(bins.windows(2).all(|pair| pair[0].distances[1] == pair[1].distances[0]));
-        let one = Depths::of(&view(&[(1.0, 1.0)]), &[], 4.0).distribution();
+        let one = alone(&view(&[(1.0, 1.0)]), &[]).distribution();
         assert_eq!((one.len(), one[0].share), (1, 1.0));
-        assert!(Depths::of(&view(&[(0.0, 1.0)]), &[], 4.0).distribution().is_empty());
-        for unit in [0.0, f64::INFINITY, f64::NAN] {
-            let odd = Depths::of(&view(&[(1.0, 1.0)]), &[], unit).distribution();
-            assert_eq!(odd.len(), 1, "{unit}");
+        assert!(alone(&view(&[(0.0, 1.0)]), &[]).distribution().is_empty());
+        for back in [0.0, f64::INFINITY, f64::NAN] {
+            let own = camera(1, back);
+            let onlookers = Onlookers::around(DVec3::ZERO, std::slice::from_ref(&own));
+            let odd = Depths::of(&view(&[(1.0, 1.0)]), &own, &[], &onlookers).distribution();
+            assert_eq!(odd.len(), 1, "{back}");
         }
     }
 

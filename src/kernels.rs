@@ -306,13 +306,6 @@ impl Plan {
         }
     }
 
-    fn rarity(&self) -> &'static [Part] {
-        match self.config.loss.sparsity > 0.0 {
-            true => &[OCCUPANCY, part!("rarity/stored.wgsl")],
-            false => &[part!("rarity/none.wgsl")],
-        }
-    }
-
     fn depth_target(&self) -> Part {
         if self.needs.depth { part!("depth_target/stored.wgsl") } else { part!("depth_target/none.wgsl") }
     }

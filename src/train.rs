@@ -9,7 +9,7 @@ use crate::gpu::timer::Timer;
 use crate::kernels::{self, Counters, Plan, Step, Workspace, color, density, marching, occupancy, training};
 use crate::model::{FEATURES, pcg};
 use crate::views::Views;
-use crate::visibility::{hidden_cells, rarities};
+use crate::visibility::hidden_cells;
 use anyhow::{Result, bail};
 use std::sync::Arc;
 
@@ -78,9 +78,6 @@ impl Trainer {
         let visible: Vec<u32> =
             (0..).zip(&hidden).filter(|(_, hidden)| !**hidden).map(|(cell, _)| cell).collect();
         let mut workspace = Workspace::for_training(gpu, &plan, &visible)?;
-        if plan.config.loss.sparsity > 0.0 {
-            workspace.write(gpu, "rarities", &rarities(views.drawn(), &views.bounds));
-        }
         workspace.add(gpu.storage_with("cameras", &views.on_device)?);
         workspace.add_banks(views.banks);
         let stages = step_stages(gpu, &plan, &workspace)?;

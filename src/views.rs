@@ -17,8 +17,6 @@ pub struct Views {
     pub(crate) bounds: Bounds,
     /// One per photo that was added.
     pub(crate) silhouettes: Vec<Silhouette>,
-    /// Whether a pixel of the photo can be drawn; likewise.
-    pub(crate) can_be_drawn: Vec<bool>,
     /// In box space; one per photo of which a pixel can be drawn.
     pub(crate) on_device: Vec<kernels::Camera>,
     pub(crate) banks: Banks,
@@ -63,7 +61,6 @@ impl Views {
             cameras: cameras.to_vec(),
             bounds: bounds.clone(),
             silhouettes: Vec::with_capacity(cameras.len()),
-            can_be_drawn: Vec::with_capacity(cameras.len()),
             on_device: Vec::with_capacity(cameras.len()),
             banks,
             gpu: Arc::clone(gpu),
@@ -100,14 +97,7 @@ impl Views {
         }
         self.row += rows_of(records.len());
         self.silhouettes.push(Silhouette::of(photo));
-        self.can_be_drawn.push(pixel_count > 0);
         Ok(())
-    }
-
-    /// Cameras of which a pixel can be drawn, with their silhouettes.
-    pub(crate) fn drawn(&self) -> impl Iterator<Item = (&Camera, &Silhouette)> {
-        let all = self.cameras.iter().zip(&self.silhouettes);
-        all.zip(&self.can_be_drawn).filter(|(_, can_be_drawn)| **can_be_drawn).map(|(view, _)| view)
     }
 
     /// Whether every camera has its photo, and some pixel can be drawn.

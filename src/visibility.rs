@@ -18,12 +18,6 @@ const VIEWS_TO_CARVE: usize = 2;
 /// Pixels added around a cell's footprint, for filtered edges and inexact poses.
 const MARGIN_PX: f64 = 1.5;
 
-/// Cells along each axis of a cascade that [`rarities`] tells apart.
-pub const RARITY_CELLS: u32 = 16;
-
-/// The most that a place can be rarer than the best seen one.
-const RAREST: f64 = 50.0;
-
 /// What one view says of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sight {
@@ -48,20 +42,6 @@ pub fn hidden_cells(
         cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
     let carves = views.iter().any(|view| !view.silhouette.is_opaque());
     of_cells(bounds, cells, |center, side| is_hidden(&views, carves, center, side))
-}
-
-/// For each of [`RARITY_CELLS`]³ cells per cascade, in the order of [`hidden_cells`], how many times as many cameras see
-/// the middle of the best seen cell as see its own; at most 50.
-#[must_use]
-pub fn rarities<'a>(
-    looking: impl Iterator<Item = (&'a Camera, &'a Silhouette)>,
-    bounds: &Bounds,
-) -> Vec<f32> {
-    let views: Vec<_> = looking.map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
-    let sees = |center| views.iter().filter(|view| view.sight(center, 0.0) != Sight::Unseen).count();
-    let counts = of_cells(bounds, RARITY_CELLS, |center, _| sees(center) as f64);
-    let most = counts.iter().copied().fold(1.0, f64::max);
-    counts.into_iter().map(|count| (most / count).min(RAREST) as f32).collect()
 }
 
 /// What `value` says of each of `cells`³ cells per cascade, of which it is told the middle and the side.
@@ -193,37 +173,6 @@ mod tests {
                 DVec3::new(0.1, -0.4, 0.2),
             ),
         }
-    }
-
-    /// Two cameras that look at the centre from two sides: it is seen by both, the room to either side by one, and what
-    /// lies behind both by none.
-    #[test]
-    fn places_are_as_rare_as_cameras_are_few() {
-        let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades: 2, source: String::new() };
-        let looking = |back: DVec3| Camera {
-            center_px: DVec2::splat(32.0),
-            world_from_camera: DAffine3::from_mat3_translation(
-                DMat3::from_cols(DVec3::Z.cross(back), back.cross(DVec3::Z.cross(back)), back),
-                back * 1.9,
-            ),
-            ..camera(Lens::Pinhole)
-        };
-        let views = [looking(DVec3::X), looking(DVec3::Y)];
-        let opaque = Image {
-            width: SIZE,
-            height: SIZE,
-            has_alpha: false,
-            pixels: Pixels::Srgb8(vec![[255; 4]; (SIZE * SIZE) as usize]),
-        };
-        let silhouette = Silhouette::of(&opaque.into());
-        let found = rarities(views.iter().map(|camera| (camera, &silhouette)), &bounds);
-        let n = RARITY_CELLS as usize;
-        let at = |cascade: usize, x: usize, y: usize, z: usize| found[((cascade * n + z) * n + y) * n + x];
-        assert_eq!(found.len(), 2 * n.pow(3));
-        assert_eq!(at(0, n / 2, n / 2, n / 2), 1.0);
-        assert_eq!(at(1, n - 2, n / 2, n / 2), 2.0);
-        assert_eq!(at(1, n / 2, n - 2, n / 2), 2.0);
-        assert_eq!(f64::from(at(1, n - 1, n - 1, n / 2)), RAREST);
     }
 
     /// No cell that a pixel's ray goes through before it meets anything opaque may be taken for hidden.

@@ -209,7 +209,6 @@ fn tiny_batch(random: &mut Random, rays: usize) -> Vec<TrainingRay> {
         delta: random.number(0.05, 0.5),
         gains: [1.0; 2],
         distance: random.number(0.0, 2.0),
-        rarity: 0.0,
     };
     (0..rays)
         .map(|count| TrainingRay {

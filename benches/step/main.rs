@@ -94,7 +94,7 @@ enum Preset {
 
 impl Preset {
     fn config(self) -> Result<Config> {
-        let mut config = if matches!(self, Self::Gpu) { Config::default() } else { Config::for_cpu(false)? };
+        let mut config = Config::preset(!matches!(self, Self::Gpu), false)?;
         if matches!(self, Self::Full) {
             config.merge(&json!({
                 "grid": { "levels": 16, "log2_table": 15 },

@@ -26,11 +26,6 @@ fn cascade_position(position: vec3<f32>, cascade: u32) -> vec3<f32> {
 
 // The cell of a cascade around a box-space position, or the nearest one.
 fn cell_around(position: vec3<f32>, cascade: u32) -> u32 {
-    return cell_at(cascade_position(position, cascade), cascade, CELLS);
-}
-
-// The same of a position in cells, where a cascade has `cells` along each axis.
-fn cell_at(position: vec3<f32>, cascade: u32, cells: u32) -> u32 {
-    let cell = vec3<u32>(clamp(position, vec3(0.0), vec3(f32(cells) - 1.0)));
-    return cell.x + cells * (cell.y + cells * (cell.z + cells * cascade));
+    let cell = vec3<u32>(clamp(cascade_position(position, cascade), vec3(0.0), vec3(f32(CELLS) - 1.0)));
+    return cell.x + CELLS * (cell.y + CELLS * (cell.z + CELLS * cascade));
 }

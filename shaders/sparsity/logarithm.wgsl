@@ -1,13 +1,11 @@
 // Needs: counters, exp, log. Provides: the sparsity's share of the loss, SPARSITY / M times the sum of
-// v T^(1/8) d ln(1 + sigma / sigma_0): what fills places that few cameras see must be worth it. v, the rarity of the
-// place, and T^(1/8) are constants as far as gradients go. A kept sample stands for as many as it has gain. See
-// `reference::loss`.
+// (1 - T) d ln(1 + sigma / sigma_0): what is hidden by what lies in front of it need not be there. 1 - T is a constant as
+// far as gradients go. A kept sample stands for as many as it has gain. See `reference::loss`.
 
 // What of it a sample has, but for the function of its density.
 fn sparsity_part(i: u32, root: f32, gain: f32) -> f32 {
-    let kept = kept_steps_load(i);
     // The root is that of T.
-    return SPARSITY * gain * kept.w * sqrt(sqrt(root)) * kept.y;
+    return SPARSITY * gain * (1.0 - root * root) * kept_steps_load(i).y;
 }
 
 fn sparsity_density(i: u32) -> f32 {

@@ -76,7 +76,7 @@ pub fn random_batch(random: &mut Random, rays: usize, samples: usize) -> Vec<Tra
     let sample = |random: &mut Random, direction: DVec3| {
         let position = random.vector(0.0, 1.0);
         let (delta, distance) = (random.number(0.01, 0.3), position.dot(direction));
-        RaySample { position, delta, gains: [1.0; 2], distance, rarity: 0.0 }
+        RaySample { position, delta, gains: [1.0; 2], distance }
     };
     (counts.into_iter().enumerate())
         .map(|(ray, count)| {

@@ -113,7 +113,7 @@ impl Fused {
         let (mut spans, mut steps, mut colors) = (Vec::new(), Vec::new(), Vec::new());
         for ray in rays {
             spans.push([steps.len() as u32, ray.s.len() as u32]);
-            steps.extend(ray.s.iter().zip(ray.delta).map(|(&s, &delta)| [s as f32, delta as f32, 0.0]));
+            steps.extend(ray.s.iter().zip(ray.delta).map(|(&s, &delta)| [s as f32, delta as f32]));
             colors.extend(ray.color.iter().map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 0.0]));
         }
         let targets: Vec<_> = rays.iter().map(|ray| ray.target.map(|x| x as f32)).collect();

@@ -70,7 +70,7 @@ pub fn positions(random: &mut Random, count: usize) -> Vec<DVec3> {
 
 /// A ray whose samples lie at `positions`.
 fn one_ray(positions: &[DVec3]) -> TrainingRay {
-    let sample = |&position| RaySample { position, delta: 0.1, gains: [1.0; 2], distance: 0.0, rarity: 0.0 };
+    let sample = |&position| RaySample { position, delta: 0.1, gains: [1.0; 2], distance: 0.0 };
     TrainingRay {
         direction: DVec3::Z,
         samples: positions.iter().map(sample).collect(),

@@ -6,7 +6,7 @@ use crate::config::{ColorLoss, Loss};
 use crate::kernels::{Counters, training};
 use crate::reference::Transmittance;
 use crate::reference::composite::{CompositeInput, CompositeOutput, optical_depths};
-use crate::reference::loss::{Places, composite_with, distortion, sparsity};
+use crate::reference::loss::{Places, SPARSE_DENSITY, composite_with, distortion};
 use crate::reference::model::Objective;
 use anyhow::Result;
 use std::iter::repeat_n;
@@ -22,8 +22,6 @@ struct Ray {
     /// Distances of the samples, and of what is known to be there; 0 where nothing is.
     distances: Vec<f64>,
     goal: f64,
-    /// How rare the places of the samples are.
-    rarities: Vec<f64>,
     target: [f64; 4],
     background: [f64; 3],
 }
@@ -100,10 +98,10 @@ impl Case {
 
 fn upload(bench: &super::Workbench, rays: &[Ray], spans: &[[u32; 2]]) {
     let all = |value: fn(&Ray) -> Vec<[f32; 4]>| rays.iter().flat_map(value).collect::<Vec<_>>();
-    let steps: Vec<[f32; 3]> = rays
+    let steps: Vec<[f32; 2]> = rays
         .iter()
-        .flat_map(|ray| ray.s.iter().zip(&ray.delta).zip(&ray.rarities))
-        .map(|((&s, &d), &rarity)| [s as f32, d as f32, rarity as f32])
+        .flat_map(|ray| ray.s.iter().zip(&ray.delta))
+        .map(|(&s, &d)| [s as f32, d as f32])
         .collect();
     bench.set_kept_steps(&steps);
     bench.write("color", &all(|ray| ray.color.iter().map(|c| narrow([c[0], c[1], c[2], 0.0])).collect()));
@@ -139,7 +137,7 @@ impl Ray {
         let mut numbers = |low: f64, high: f64| -> Vec<f64> {
             random.numbers(count, low, high).into_iter().map(f64::from).collect()
         };
-        let (s, delta, rarities) = (numbers(-6.0, 5.0), numbers(0.01, 0.2), numbers(1.0, 50.0));
+        let (s, delta) = (numbers(-6.0, 5.0), numbers(0.01, 0.2));
         let channels = [numbers(0.0, 20.0), numbers(0.0, 1.0), numbers(0.0, 0.05)];
         let mut distances = numbers(nearest.ln(), farthest.ln());
         distances.sort_by(f64::total_cmp);
@@ -155,7 +153,6 @@ impl Ray {
             delta,
             color,
             distances,
-            rarities,
             goal: if number % 4 == 3 { 0.0 } else { number_in(0.1, 4.0) },
             target: std::array::from_fn(|x| number_in(0.0, [20.0, 1.0, 0.05, 1.0][x])),
             background: std::array::from_fn(|_| number_in(0.0, 1.0)),
@@ -178,7 +175,7 @@ impl Ray {
             background: self.background,
             rays_in_batch: 200,
         };
-        let places = Places { distances: &self.distances, depth: self.goal, rarities: &self.rarities };
+        let places = Places { distances: &self.distances, depth: self.goal };
         let want = composite_with(objective.loss, objective.transmittance, &input, places, &[]);
         let scales = Scales::new(objective, &input, &want, places);
         let case = |what: &str| format!("ray {number}, {what}");
@@ -222,13 +219,13 @@ impl Scales {
         let depth: f64 = output.weights.iter().zip(&offsets).map(|(w, offset)| w * offset).sum();
         let apart = SizeOfDistortion::new(ray, output, places);
         let shares = [residual.as_slice(), &[2.0 * loss.depth / m * depth, loss.distortion / m]].concat();
-        // All terms of the sparsity have one sign.
-        let all = vec![1.0; ray.s.len()];
-        let (sparse, by_sparsity) = sparsity(objective.transmittance, ray, places.rarities, &all);
-        let sparsity_share = loss.sparsity / m;
+        // All terms of the sparsity have one sign, but 1 - T is a difference.
+        let sparse: Vec<f64> = (ray.s.iter().zip(ray.delta))
+            .map(|(s, delta)| loss.sparsity / m * delta * (s.exp() / SPARSE_DENSITY).ln_1p())
+            .collect();
         let loss = (0..4).map(|x| residual[x] * both(x) / 2.0).sum::<f64>()
             + (loss.depth * depth.powi(2) + loss.distortion * apart.sum) / m
-            + sparsity_share * sparse;
+            + sparse.iter().sum::<f64>();
         let depths = optical_depths(ray);
         let mut behind = [ray.background[0], ray.background[1], ray.background[2], 0.0, 0.0, 0.0]
             .map(|background| output.transmittance_end * background);
@@ -238,8 +235,7 @@ impl Scales {
             let channels = [r, g, b, 1.0, offsets[i], apart.slopes[i]];
             let passing = (-depths[..=i].iter().sum::<f64>()).exp();
             let term = |x: usize| behind[x] + (passing + output.weights[i]) * channels[x].abs();
-            d_s[i] = sparsity_share * by_sparsity[i]
-                + depths[i] * (0..6).map(|x| shares[x] * term(x)).sum::<f64>();
+            d_s[i] = sparse[i] + depths[i] * (0..6).map(|x| shares[x] * term(x)).sum::<f64>();
             (0..6).for_each(|x| behind[x] += output.weights[i] * channels[x].abs());
         }
         Self { residual, loss, d_s }

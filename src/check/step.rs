@@ -14,11 +14,9 @@ use crate::reference::activation::log_density;
 use crate::reference::adam::Adam;
 use crate::reference::composite::optical_depth;
 use crate::reference::model::{BatchOutput, Model, RaySample, TrainingRay};
-use crate::reference::occupancy::OccupancyShape;
 use crate::reference::step::Training;
 use crate::train::{StepStats, Trainer};
 use crate::views::Views;
-use crate::visibility::RARITY_CELLS;
 use anyhow::Result;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -236,19 +234,13 @@ impl TinyTraining {
             true => bench.read("depth_targets", rays)?,
             false => vec![0.0; rays],
         };
-        let shape = OccupancyShape { cascades: bench.plan.needs.cascades, resolution: RARITY_CELLS };
-        let rarities: Vec<f32> = match bench.plan.config.loss.sparsity > 0.0 {
-            true => bench.read("rarities", shape.cells())?,
-            false => vec![0.0; shape.cells()],
-        };
         let scale = bench.plan.density_scale();
         let vector = |x: &[f32; 4]| DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
         let sample = |index: usize, ray: usize| {
             let position = vector(&samples[index]);
             let [origin, direction] = directions[ray].each_ref().map(vector);
             let distance = (position - origin).dot(direction) * scale;
-            let rarity = f64::from(rarities[shape.cell(position)]);
-            RaySample { position, delta: f64::from(samples[index][3]), gains: gains[index], distance, rarity }
+            RaySample { position, delta: f64::from(samples[index][3]), gains: gains[index], distance }
         };
         let stop = bench.plan.config.selection.stop_transmittance;
         let of_ray = |ray: usize| -> Vec<RaySample> {

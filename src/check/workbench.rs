@@ -164,10 +164,9 @@ impl Workbench {
             .collect())
     }
 
-    /// Log-densities, steps and rarities of the kept samples, as if all had been chosen.
-    pub fn set_kept_steps(&self, steps: &[[f32; 3]]) {
-        let row = |&[s, delta, rarity]: &[f32; 3]| [s, delta, 0.0, rarity];
-        self.write("kept_steps", &steps.iter().map(row).collect::<Vec<_>>());
+    /// Log-densities and steps of the kept samples, as if all had been chosen.
+    pub fn set_kept_steps(&self, steps: &[[f32; 2]]) {
+        self.write("kept_steps", &steps.iter().map(|&[s, delta]| [s, delta, 0.0, 0.0]).collect::<Vec<_>>());
         self.write("kept_gains", &vec![[1.0_f32; 2]; steps.len()]);
     }
 

@@ -3,9 +3,8 @@
 use crate::progress::Progress;
 use crate::remarks::Remarks;
 use anyhow::Result;
-use glam::DVec3;
 use nerf::dataset::{Dataset, Photo};
-use nerf::depths::{Depths, fog, median_depth};
+use nerf::depths::{Depths, Onlookers, fog, median_depth};
 use nerf::metrics::{filled, psnr_where, ssim};
 use nerf::picture::{ColorSpace, photo_over};
 use nerf::render::Renderer;
@@ -113,8 +112,8 @@ pub(super) struct Judge<'a> {
     pub(super) background: [f32; 3],
     /// Where the photos are.
     pub(super) dataset: &'a Dataset,
-    /// What the cameras look at, in world space.
-    focus: Option<DVec3>,
+    /// The dataset's cameras, if they look at one point.
+    onlookers: Option<Onlookers>,
 }
 
 /// A rendered view beside its photo.
@@ -137,7 +136,8 @@ pub(super) struct Compared {
 impl<'a> Judge<'a> {
     /// A renderer beside photos, on black.
     pub(super) fn new(renderer: Renderer, color_space: ColorSpace, dataset: &'a Dataset) -> Self {
-        Self { renderer, color_space, background: [0.0; 3], dataset, focus: dataset.focus() }
+        let onlookers = Onlookers::of(dataset);
+        Self { renderer, color_space, background: [0.0; 3], dataset, onlookers }
     }
 
     /// Renders frame `index` and compares it with its photo, where the photo's pixels count.
@@ -147,16 +147,17 @@ impl<'a> Judge<'a> {
         let rendered = self.color_space.over(&view.color, self.background);
         let target = photo_over(&photo.image, self.background);
         let (width, height) = (view.width as usize, view.height as usize);
-        let distance = self.focus.map(|focus| frame.camera.position().distance(focus));
+        let onlookers = self.onlookers.as_ref();
         let score = Score {
             file: frame.name.clone(),
             psnr: psnr_where(&rendered, &target, &photo.ignored),
             ssim: ssim(&filled(&rendered, &target, &photo.ignored), &target, width, height),
-            depths: distance.map(|distance| Depths::of(&view, &photo.ignored, distance)),
+            depths: onlookers.map(|around| Depths::of(&view, &frame.camera, &photo.ignored, around)),
             ignored: Some(photo.count_ignored()).filter(|&count| count > 0),
             saved: None,
         };
-        let unit = distance.unwrap_or_else(|| median_depth(&view.depth));
+        let unit = onlookers.map(|around| around.distance(&frame.camera));
+        let unit = unit.unwrap_or_else(|| median_depth(&view.depth));
         let size = [view.width, view.height];
         Ok(Compared { score, size, rendered, photo: target, depth: view.depth, unit })
     }

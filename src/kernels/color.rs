@@ -43,11 +43,11 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
-    let (select, rarity, packing) = match selection {
-        Selection::Training => (select(gpu, plan, workspace)?, plan.rarity(), part!("packing/training.wgsl")),
-        Selection::View => (viewing::select(gpu, plan, workspace)?, &[][..], part!("packing/view.wgsl")),
+    let (select, packing) = match selection {
+        Selection::Training => (select(gpu, plan, workspace)?, part!("packing/training.wgsl")),
+        Selection::View => (viewing::select(gpu, plan, workspace)?, part!("packing/view.wgsl")),
     };
-    let kept = [&[COUNTERS, DENSITY], rarity, &[packing, part!("kept.wgsl")]].concat();
+    let kept = [COUNTERS, DENSITY, packing, part!("kept.wgsl")];
     let kept = plan.ray_stage(gpu, workspace, "kept", &kept)?;
     let input = plan.kernel(gpu, "color input", &[COUNTERS, HARMONICS, part!("color_input.wgsl")])?;
     let input = Stage::indirect(workspace.bind(gpu, &input, &[])?, workspace.get("dispatch"), dispatch::KEPT);

@@ -4,7 +4,6 @@ use super::{Plan, dispatch};
 use crate::config::Transmittance;
 use crate::gpu::source::Source;
 use crate::model::DENSITY_OUTPUTS;
-use crate::visibility::RARITY_CELLS;
 use std::fmt::Display;
 
 /// Dimensions of the random numbers, as the kernels draw them.
@@ -59,7 +58,6 @@ impl Plan {
             ("SAMPLES_PER_THREAD", self.product.rows),
             ("CELLS", config.occupancy.cells as usize),
             ("CELL_COUNT", self.cell_count()),
-            ("RARITY_CELLS", RARITY_CELLS as usize),
             ("CASCADES", needs.cascades as usize),
             ("CAMERA_COUNT", needs.cameras.max(1)),
             ("MAX_STEPS", config.march.most_steps),

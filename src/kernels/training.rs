@@ -15,7 +15,6 @@ use crate::gpu::pass::{Size, Stage};
 use crate::gpu::tensor::{Element, Memory};
 use crate::gpu_struct;
 use crate::model::{DENSITY_OUTPUTS, Layer};
-use crate::visibility::RARITY_CELLS;
 use anyhow::Result;
 
 gpu_struct! {
@@ -64,10 +63,6 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     demands.extend(of_rays.map(|name| Demand::storage::<[f32; 4]>(name, batch.rays)));
     let of_weights = ["mlp_first", "mlp_second", "d_weights"];
     demands.extend(of_weights.map(|name| Demand::storage::<[f32; 4]>(name, layout.quads)));
-    if plan.config.loss.sparsity > 0.0 {
-        let cells = plan.needs.cascades as usize * (RARITY_CELLS as usize).pow(3);
-        demands.push(Demand::storage::<f32>("rarities", cells));
-    }
     if plan.needs.depth {
         demands.push(Demand::storage::<f32>("depth_targets", batch.rays));
     }

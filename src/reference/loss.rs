@@ -7,7 +7,7 @@
 //! v_x  = 1                     squared, and always for the opacity
 //! v_x  = 1 / (max(R_x, g_x/1000) max(R_x, g_x) + 0.01)     relative; a constant as far as gradients go
 //! D    = Σ_i ω_i (t_i − g_t)
-//! S    = Σ_i γ_i ν_i T_i^(1/8) δ_i ln(1 + σ_i/σ_0)       γ = (g' + g'')/2
+//! S    = Σ_i γ_i (1 − T_i) δ_i ln(1 + σ_i/σ_0)          γ = (g' + g'')/2
 //! X    = Σ_ij ω_i ω_j |x_i − x_j| + 1/3 Σ_i ω_i² Δ_i       x = t/(1 + t),  Δ = δ/(1 + t)²
 //! ```
 //!
@@ -17,7 +17,7 @@
 //! ```text
 //! d_c_xi = v_x/(4M) (ω'_i e''_x + ω''_i e'_x)
 //! d_s_i  = Σ_x v_x/(4M) (e''_x dR'_x/ds_i + e'_x dR''_x/ds_i)  +  2 λ_t/M D dD/ds_i  +  λ_x/M Σ_j dX/dω_j dω_j/ds_i
-//!          +  λ_s/M γ_i ν_i T_i^(1/8) δ_i σ_i/(σ_0 + σ_i)
+//!          +  λ_s/M γ_i (1 − T_i) δ_i σ_i/(σ_0 + σ_i)
 //! dX/dω_j = 2 Σ_k ω_k |x_j − x_k| + 2/3 ω_j Δ_j
 //! ```
 //!
@@ -36,9 +36,9 @@
 //! inner cube, and `x` orders what lies far away in a finite range.
 //!
 //! `S` is a prior for empty space in the form of Hedman et al. 2021 (SNeRG) with the logarithm of the density where
-//! they have that of its square. `ν`, the rarity, says how many times as many cameras see the best seen place: what fills
-//! places that few cameras see must be worth it. `ν` and `T^(1/8)` are constants as far as gradients go. The latter lets
-//! what is in front pay a little more: without it, surfaces without texture come out too near, with `T^(1/2)` too far.
+//! they have that of its square. What is hidden by what lies in front of it need not be there, and costs samples; what is
+//! seen is left alone, since any price for it moves surfaces without texture. `1 − T` is a constant as far as gradients
+//! go.
 
 use super::Transmittance;
 use super::composite::{CompositeInput, CompositeOutput, composite, optical_depths, transmittances};
@@ -73,8 +73,6 @@ pub struct Places<'a> {
     pub distances: &'a [f64],
     /// `g_t`, where something is known to be; 0 where nothing is.
     pub depth: f64,
-    /// `ν_i`, `[samples]`; empty where the loss has no sparsity.
-    pub rarities: &'a [f64],
 }
 
 impl Loss {
@@ -122,7 +120,7 @@ pub fn composite_with(
         thinned.add_slopes(loss.distortion / m, &slopes, &mut output);
     }
     if loss.sparsity > 0.0 {
-        let (sparsity, slopes) = sparsity(convention, ray, places.rarities, &thinned.gains);
+        let (sparsity, slopes) = sparsity(convention, ray, &thinned.gains);
         output.loss += loss.sparsity / m * sparsity;
         output.d_s.iter_mut().zip(slopes).for_each(|(d_s, slope)| *d_s += loss.sparsity / m * slope);
     }
@@ -186,15 +184,10 @@ pub fn distortion(weights: &[f64], distances: &[f64], delta: &[f64]) -> (f64, Ve
     (terms.sum(), slopes.collect())
 }
 
-/// `S` of a ray whose samples have these rarities and mean gains, and its slopes by their log-densities.
-pub fn sparsity(
-    convention: Transmittance,
-    ray: &CompositeInput,
-    rarities: &[f64],
-    gains: &[f64],
-) -> (f64, Vec<f64>) {
+/// `S` of a ray whose samples have these mean gains, and its slopes by their log-densities.
+pub fn sparsity(convention: Transmittance, ray: &CompositeInput, gains: &[f64]) -> (f64, Vec<f64>) {
     let in_front = transmittances(convention, &optical_depths(ray));
-    let factor = |i: usize| gains[i] * rarities[i] * in_front[i].powf(0.125) * ray.delta[i];
+    let factor = |i: usize| gains[i] * (1.0 - in_front[i]) * ray.delta[i];
     let relative = |i: usize| ray.s[i].exp() / SPARSE_DENSITY;
     let terms = (0..ray.s.len()).map(|i| factor(i) * relative(i).ln_1p());
     let slopes = (0..ray.s.len()).map(|i| factor(i) * relative(i) / (1.0 + relative(i)));
@@ -237,8 +230,7 @@ mod tests {
         terms.sum::<f64>() / (4.0 * m) + (loss.depth * depth * depth + loss.distortion * distortion) / m
     }
 
-    const PLACES: Places =
-        Places { distances: &[1.0 / 3.0, 1.0, 1.5], depth: 0.7, rarities: &[1.0, 3.0, 50.0] };
+    const PLACES: Places = Places { distances: &[1.0 / 3.0, 1.0, 1.5], depth: 0.7 };
 
     #[test]
     fn gradients_are_slopes() {
@@ -288,7 +280,7 @@ mod tests {
     #[test]
     fn only_what_is_there_has_a_depth() {
         let loss = Loss { depth: 2.0, ..Loss::default() };
-        let places = Places { distances: &[0.9], depth: 0.7, rarities: &[] };
+        let places = Places { distances: &[0.9], depth: 0.7 };
         let ray = |s: &'static [f64]| CompositeInput {
             s,
             delta: &[1.0],
@@ -313,8 +305,7 @@ mod tests {
             let constants = transmittances(convention, &optical_depths(&RAY));
             let part = |i: usize, s: f64| {
                 let gain = [1.0, 2.5, 1.0][i];
-                let place = [1.0, 3.0, 50.0][i] * constants[i].sqrt().sqrt().sqrt();
-                0.6 / 3.0 * gain * place * RAY.delta[i] * (1.0 + s.exp() / 5.0).ln()
+                0.6 / 3.0 * gain * (1.0 - constants[i]) * RAY.delta[i] * (1.0 + s.exp() / 5.0).ln()
             };
             let sum: f64 = (0..3).map(|i| part(i, RAY.s[i])).sum();
             assert!((with.loss - without.loss - sum).abs() < 1e-12);

@@ -52,8 +52,6 @@ pub struct RaySample {
     pub gains: [f64; 2],
     /// Distance along the ray, in sides of the inner cube, like the ray's depth.
     pub distance: f64,
-    /// How many times as many cameras see the best seen place as see this one.
-    pub rarity: f64,
 }
 
 /// A ray to train on.
@@ -138,7 +136,6 @@ impl Model {
             let evaluations: Vec<Evaluation> =
                 (ray.samples.iter()).map(|sample| self.evaluate(sample.position, ray.direction)).collect();
             let distances = collect(&ray.samples, |sample| sample.distance);
-            let rarities = collect(&ray.samples, |sample| sample.rarity);
             let composited = composite_with(
                 objective.loss,
                 objective.transmittance,
@@ -152,7 +149,7 @@ impl Model {
                     background: ray.background,
                     rays_in_batch: rays.len() as u32,
                 },
-                Places { distances: &distances, depth: ray.depth, rarities: &rarities },
+                Places { distances: &distances, depth: ray.depth },
                 &collect(&ray.samples, |sample| sample.gains),
             );
             batch.loss += composited.loss;

@@ -3,8 +3,10 @@
 mod browser;
 mod command;
 
+use glam::{DAffine3, DVec2, DVec3};
+use nerf::camera::{Camera, Lens};
 use nerf::dataset::spread_order;
-use nerf::depths::Depths;
+use nerf::depths::{Depths, Onlookers};
 use nerf::render::View;
 use nerf::report::log::Log;
 use nerf::report::pictures::{LONGEST_SIDE, Pair, Pictures};
@@ -48,7 +50,7 @@ fn views(count: usize, side: u32) -> TestViews {
         let off = |c: &[f32; 3]| c.map(|value| (value + 0.02 * (40.0 * value).sin()).clamp(0.0, 1.0));
         let rendered: Vec<_> = photo.iter().map(off).collect();
         let view = sphere(side);
-        let depths = Some(Depths::of(&view, &[], 2.0));
+        let depths = Some(depths_of(&view));
         let pair =
             Pair { size: [side, side], rendered: &rendered, photo: &photo, depth: &view.depth, unit: 2.0 };
         let name = format!("test/<i>{number}.png");
@@ -56,6 +58,21 @@ fn views(count: usize, side: u32) -> TestViews {
         views.add(number, scores, || Pictures::new(&pair)).expect("drawn");
     }
     views
+}
+
+/// The depths of a view from two units away from the focus, at which three other cameras look from the side.
+fn depths_of(view: &View) -> Depths {
+    let camera = |angle: f64| Camera {
+        width: view.width,
+        height: view.height,
+        focal_px: DVec2::splat(f64::from(view.width)),
+        center_px: DVec2::splat(f64::from(view.width) / 2.0),
+        lens: Lens::Pinhole,
+        world_from_camera: DAffine3::from_rotation_y(angle)
+            * DAffine3::from_translation(DVec3::new(0.0, 0.0, 2.0)),
+    };
+    let cameras = [0.0, 1.5, 1.6, 1.7, 1.8].map(camera);
+    Depths::of(view, &cameras[0], &[], &Onlookers::around(DVec3::ZERO, &cameras))
 }
 
 /// A sphere two units away before nothing, and a tenth of the pixels, rows at the top, half a unit away.
@@ -314,7 +331,7 @@ fn fog_is_warned_of() {
     assert!(untold.contains("median depth") && untold.contains("is not told: the optical axes do not cross"));
     assert!(!untold.contains("Fog: "));
     let empty = View { width: 1, height: 1, color: vec![[0.0; 4]], depth: vec![0.0] };
-    let clear = with(ViewScores { depths: Some(Depths::of(&empty, &[], 1.0)), ..scores });
+    let clear = with(ViewScores { depths: Some(depths_of(&empty)), ..scores });
     assert!(
         clear.contains("no pixel shows anything") && clear.contains("0 %</dd>") && !clear.contains("Fog: ")
     );

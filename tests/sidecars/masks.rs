@@ -3,7 +3,7 @@
 use super::driving::{folder, number, object, text, train};
 use super::{DECIDED, Random, SIZE, TOYS, are_equal, copy, edit_frames, images, remarks, repaint, stem};
 use image::{GrayImage, Luma};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -112,27 +112,6 @@ fn masks_that_ignore_whole_photos() {
     let warning =
         "warning: masks ignore every pixel of 1 of 33 training photos, which add nothing: ./train/0004";
     assert!(said.contains(warning), "{said}");
-}
-
-/// Where a camera stands whose whole photo is ignored decides nothing, also not which places few cameras see.
-#[test]
-fn photos_that_masks_ignore_do_not_look() {
-    let standing_at = |other: &str| {
-        let dataset = with_mask_paths(&format!("ignored_at_{other}"), 0, 255);
-        GrayImage::new(SIZE, SIZE).save(dataset.join("ignore/0004.png")).expect("writable");
-        let listing = fs::read(dataset.join("transforms_train.json")).expect("a listing");
-        let listing: Value = serde_json::from_slice(&listing).expect("JSON");
-        let mut frames = listing["frames"].as_array().expect("frames").iter();
-        let pose = frames.find(|frame| frame["file_path"] == format!("./train/{other}")).expect("a frame");
-        edit_frames(&dataset, |name| match name {
-            "./train/0004" => vec![("transform_matrix", pose["transform_matrix"].clone())],
-            _ => Vec::new(),
-        });
-        let run = folder(&format!("ignored_at_{other}_run"));
-        train(&dataset, &run, &[&DECIDED[..], &["--set", "loss.sparsity=0.01"]].concat());
-        run
-    };
-    assert!(are_equal(&standing_at("0010"), &standing_at("0020")));
 }
 
 /// A mask changes which pixels the device keeps, also from one run to the next.

@@ -143,7 +143,7 @@ fn configure(mut config: Config, wishes: &Wishes<'_>) -> Result<Config> {
 
 /// The settings when nothing is said.
 pub(in crate::commands) fn defaults(is_cpu: bool, dataset: &Dataset) -> Result<Config> {
-    if is_cpu { Config::for_cpu(dataset.bounds.cascades > 1) } else { Ok(Config::default()) }
+    Config::preset(is_cpu, dataset.bounds.cascades > 1)
 }
 
 fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {

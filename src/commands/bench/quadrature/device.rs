@@ -114,7 +114,6 @@ impl Device {
                     delta: ray.delta,
                     gains: [1.0; 2],
                     distance: 0.0,
-                    rarity: 0.0,
                 };
                 ray.s.len()
             ],
