@@ -4,7 +4,7 @@ mod ranges;
 
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Number, Value};
 use std::path::Path;
 
 /// The whole configuration. `Config::default()` suits objects on a GPU; [`Config::preset`] knows the others.
@@ -325,7 +325,10 @@ impl Config {
         let Some((path, text)) = assignment.split_once('=') else {
             bail!("--set expects key.path=value, for example grid.levels=8; found '{assignment}'");
         };
-        let mut change = serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned()));
+        // People write .005, which JSON does not know.
+        let number = || text.parse().ok().and_then(Number::from_f64).map(Value::Number);
+        let mut change =
+            serde_json::from_str(text).ok().or_else(number).unwrap_or_else(|| Value::String(text.to_owned()));
         for key in path.rsplit('.') {
             change = Value::Object([(key.to_owned(), change)].into_iter().collect());
         }

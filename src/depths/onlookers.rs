@@ -8,7 +8,7 @@ use glam::DVec3;
 const ASKED: usize = 64;
 
 /// A place has few onlookers if fewer than this share of those that have the focus in their picture see it.
-const FEW: f64 = 0.25;
+const FEW: f64 = 0.125;
 
 /// What is farther away than so many times the focus is behind what a camera looks at.
 const REACH: f64 = 1.5;
@@ -48,7 +48,7 @@ impl Onlookers {
         camera.position().distance(self.focus)
     }
 
-    /// Whether fewer cameras look at a place than a quarter of those that have the focus in their picture: they have it
+    /// Whether fewer cameras look at a place than an eighth of those that have the focus in their picture: they have it
     /// there too, and no farther away than 1.5 times the focus, since cameras on the other side look at what is in
     /// between. What is in between otherwise is not asked for.
     #[must_use]
@@ -104,6 +104,6 @@ mod tests {
         let onlookers = Onlookers::around(DVec3::ZERO, &one);
         assert!(!onlookers.are_few(one[0].position() * 0.9));
         let nobody = Onlookers::around(DVec3::ZERO, &[]);
-        assert!(!nobody.are_few(DVec3::ZERO), "a quarter of none is none");
+        assert!(!nobody.are_few(DVec3::ZERO), "an eighth of none is none");
     }
 }
