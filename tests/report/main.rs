@@ -60,7 +60,7 @@ fn views(count: usize, side: u32) -> TestViews {
     views
 }
 
-/// The depths of a view from two units away from the focus, at which three other cameras look from the side.
+/// The depths of a view from two units away from the focus, at which nine other cameras look from the side.
 fn depths_of(view: &View) -> Depths {
     let camera = |angle: f64| Camera {
         width: view.width,
@@ -71,7 +71,8 @@ fn depths_of(view: &View) -> Depths {
         world_from_camera: DAffine3::from_rotation_y(angle)
             * DAffine3::from_translation(DVec3::new(0.0, 0.0, 2.0)),
     };
-    let cameras = [0.0, 1.5, 1.6, 1.7, 1.8].map(camera);
+    let sides = (0..9).map(|number| camera(1.3 + 0.05 * f64::from(number)));
+    let cameras: Vec<_> = [camera(0.0)].into_iter().chain(sides).collect();
     Depths::of(view, &cameras[0], &[], &Onlookers::around(DVec3::ZERO, &cameras))
 }
 
