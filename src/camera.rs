@@ -66,8 +66,12 @@ impl Camera {
     /// The world-space point at a depth, in world units, behind a point of the image: [`Camera::project`] backwards.
     pub fn point(&self, pixel: DVec2, depth: f64) -> Option<DVec3> {
         let ray = self.ray(pixel)?;
-        let along = if self.lens.depth_is_distance() { 1.0 } else { ray.direction.dot(self.forward()) };
-        Some(ray.origin + ray.direction * (depth / along))
+        Some(ray.origin + ray.direction * (depth / self.depth_of_unit(ray.direction)))
+    }
+
+    /// The depth that one world unit along a unit direction is worth.
+    pub fn depth_of_unit(&self, direction: DVec3) -> f64 {
+        if self.lens.depth_is_distance() { 1.0 } else { direction.dot(self.forward()) }
     }
 
     /// Whether a world-space point appears within the image, were nothing in between.

@@ -41,11 +41,6 @@ pub fn hidden_cells(
     let views: Vec<_> =
         cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
     let carves = views.iter().any(|view| !view.silhouette.is_opaque());
-    of_cells(bounds, cells, |center, side| is_hidden(&views, carves, center, side))
-}
-
-/// What `value` says of each of `cells`³ cells per cascade, of which it is told the middle and the side.
-fn of_cells<T: Send>(bounds: &Bounds, cells: u32, value: impl Fn(DVec3, f64) -> T + Sync) -> Vec<T> {
     let per_cascade = cells.pow(3);
     (0..per_cascade * bounds.cascades)
         .into_par_iter()
@@ -57,7 +52,8 @@ fn of_cells<T: Send>(bounds: &Bounds, cells: u32, value: impl Fn(DVec3, f64) -> 
                 f64::from(within / cells % cells),
                 f64::from(within / (cells * cells)),
             );
-            value(bounds.center + (corner + 0.5 - f64::from(cells) / 2.0) * side, side)
+            let center = bounds.center + (corner + 0.5 - f64::from(cells) / 2.0) * side;
+            is_hidden(&views, carves, center, side)
         })
         .collect()
 }

@@ -56,7 +56,6 @@ struct Pixel {
 
 /// The pixel whose top-left corner is `corner`. Sub-rays that the lens cannot form see nothing.
 fn pixel(scene: &Scene, camera: &Camera, corner: DVec2, pattern: &[DVec2]) -> Pixel {
-    let forward = camera.forward();
     let share = 1.0 / pattern.len() as f64;
     let mut sum = Pixel::default();
     for ray in pattern.iter().filter_map(|&offset| camera.ray(corner + offset)) {
@@ -70,8 +69,7 @@ fn pixel(scene: &Scene, camera: &Camera, corner: DVec2, pattern: &[DVec2]) -> Pi
             sum.srgb[channel] += weight * hit.color_srgb[channel];
         }
         sum.alpha += weight;
-        let along = if camera.lens.depth_is_distance() { 1.0 } else { ray.direction.dot(forward) };
-        sum.alpha_depth += weight * hit.t * along;
+        sum.alpha_depth += weight * hit.t * camera.depth_of_unit(ray.direction);
     }
     sum.alpha = sum.alpha.min(1.0);
     sum

@@ -119,11 +119,7 @@ impl Photos {
                 tally.each(&case, &ray.direction.to_array(), &want.direction.to_array(), |_| 1.0);
                 if needs.depth {
                     let depth = f64::from(photo.depth[texel as usize] * UNITS.depth);
-                    let along = match camera.lens.kind().depth_is_distance() {
-                        true => 1.0,
-                        false => want.direction.dot(camera.forward()),
-                    };
-                    let distance = depth / along;
+                    let distance = depth / camera.depth_of_unit(want.direction);
                     tally.value(depths[index].into(), distance, 1.0 + distance, || format!("{case}, depth"));
                 }
                 let origin = (want.origin - bounds().min()) / (2.0 * bounds().outer_half());
