@@ -38,7 +38,8 @@ impl Onlookers {
         let asked = evenly_spaced(&numbers, ASKED).into_iter().map(|number| cameras[number].clone());
         let mut onlookers = Self { focus, cameras: asked.collect(), enough: 0 };
         let around = onlookers.cameras.iter().filter(|camera| camera.has_in_picture(focus)).count();
-        onlookers.enough = (FEW * around as f64).ceil() as usize;
+        // Its own camera says nothing for a place, where there are others.
+        onlookers.enough = ((FEW * around as f64).ceil() as usize).max(2).min(around);
         onlookers
     }
 
@@ -48,7 +49,7 @@ impl Onlookers {
         camera.position().distance(self.focus)
     }
 
-    /// Whether fewer cameras look at a place than an eighth of those that have the focus in their picture: they have it
+    /// Whether fewer cameras look at a place than an eighth of those that have the focus in their picture, or only one: they have it
     /// there too, and no farther away than 1.5 times the focus, since cameras on the other side look at what is in
     /// between. What is in between otherwise is not asked for.
     #[must_use]
@@ -86,7 +87,7 @@ mod tests {
 
     #[test]
     fn what_hangs_before_one_camera_has_few_onlookers() {
-        for count in [12, 1000] {
+        for count in [4, 8, 12, 1000] {
             let cameras = circle(count);
             let onlookers = Onlookers::around(DVec3::ZERO, &cameras);
             assert!((onlookers.distance(&cameras[3]) - 4.0).abs() < 1e-12);
@@ -96,6 +97,14 @@ mod tests {
             assert!(onlookers.are_few(cameras[0].position() * 0.9), "a tenth of the way from a camera");
             assert!(onlookers.are_few(DVec3::new(0.0, 50.0, 0.0)), "nobody looks there");
         }
+    }
+
+    /// As many as there are of a training on few photos, which are the ones that end in fog.
+    #[test]
+    fn of_few_cameras_one_is_few() {
+        let cameras = circle(5);
+        let onlookers = Onlookers::around(DVec3::ZERO, &cameras);
+        assert!(cameras.iter().all(|camera| onlookers.are_few(camera.position() * 0.9)));
     }
 
     #[test]
