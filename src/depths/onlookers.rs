@@ -49,9 +49,9 @@ impl Onlookers {
         camera.position().distance(self.focus)
     }
 
-    /// Whether fewer cameras look at a place than an eighth of those that have the focus in their picture, or only one: they have it
-    /// there too, and no farther away than 1.5 times the focus, since cameras on the other side look at what is in
-    /// between. What is in between otherwise is not asked for.
+    /// Whether fewer cameras look at a place than an eighth of those that have the focus in their picture, or only one:
+    /// they have it there too, and no farther away than 1.5 times the focus, since cameras on the other side look at
+    /// what is in between. What is in between otherwise is not asked for.
     #[must_use]
     pub fn are_few(&self, place: DVec3) -> bool {
         let looks = |camera: &&Camera| {
