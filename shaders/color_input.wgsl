@@ -1,8 +1,7 @@
 // The colour network's input: the density network's outputs and the harmonics of the ray's direction.
-// Needs: counters, ray, harmonics.
+// Needs: counters, ray_load, harmonics.
 
-var<storage, read> counters: Counters;
-tensor<read> ray_directions: vec4<f32>;
+var<uniform> counters: Counters;
 tensor<read> density_out: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
 // `[kept, 8]`: 16 features, 16 harmonics.
@@ -16,7 +15,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let kept = kept_rows_load(index);
     let sample = kept.x * DENSITY_QUADS;
-    let terms = harmonics(ray_directions_load(kept.y).xyz);
+    let terms = harmonics(ray_direction(kept.y));
     for (var i = 0u; i < 4u; i++) {
         color_input_store(index * 8u + i, density_out_load(sample + i));
     }

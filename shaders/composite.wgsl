@@ -5,23 +5,16 @@
 // squared error is their product: (R' - g)(R'' - g), whose mean is the square of the mean error. The square of a single
 // estimate would hold its variance too, and gradients would make rays opaque too early, where nothing is left out. A
 // whole ray has one colour, and both are that.
-// Needs: counters, exp, sum, transmittance, loss, depth_loss, distortion, sparsity, weights.
+// Needs: counters, ray_target, ray_result, kept_load, exp, sum, transmittance, loss, depth_loss, distortion, sparsity,
+// weights.
 
-var<storage, read> counters: Counters;
+var<uniform> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
-// Log-density, step length, and optical depth left out in front of the sample.
-tensor<read> kept_steps: vec4<f32>;
-// How many times its own weight a sample's colour has in both estimates.
-tensor<read> kept_gains: vec2<f32>;
 // Optical depth behind the last kept sample.
 var<storage, read> ray_tails: array<f32>;
 tensor<read> color: vec4<f32>;
-var<storage, read> targets: array<vec4<f32>>;
-var<storage, read> backgrounds: array<vec4<f32>>;
-// Colour over the background, and opacity.
-var<storage, read_write> rendered: array<vec4<f32>>;
-// Squared errors of the four channels with their weights; opacity's also holds what the further terms add.
-var<storage, read_write> ray_errors: array<vec4<f32>>;
+var<storage, read> ray_targets: array<RayTarget>;
+var<storage, read_write> ray_results: array<RayResult>;
 // dL/dc in rgb and dL/ds in w. Between the walks it holds tau and the root of T of each
 // sample, and what the distortion sums up in front of it.
 tensor<read_write> d_color: vec4<f32>;
@@ -34,18 +27,19 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let span = kept_spans[index];
     let end = span.x + span.y;
-    let background = vec4(backgrounds[index].rgb, 0.0);
+    let ray = ray_targets[index];
+    let background = vec4(ray.background, 0.0);
     // There are fewer than 2^31 samples.
     let zero = span.x >> 31u;
     let tail = ray_tails[index];
     var depth = sum_of(vec4(0.0));
     var sums = array(sum_of(vec4(0.0)), sum_of(vec4(0.0)));
-    var distance = depth_begin(index);
-    var spread = spread_begin(index);
+    var distance = depth_begin(ray.depth);
+    var spread = spread_begin();
     var sparsity = 0.0;
     for (var i = span.x; i < end; i++) {
-        let kept = kept_steps_load(i);
-        let gains = kept_gains_load(i);
+        let kept = kept_step(i);
+        let gains = kept_gains(i);
         depth = sum_add(depth, vec4(kept.z), zero);
         let tau = optical_depth(kept.x, kept.y);
         let root = exp_accurate(-0.5 * transmittance_depth(depth.value.x, tau));
@@ -65,11 +59,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let first = sums[0].value + through;
     let second = sums[1].value + through;
     let result = 0.5 * (first + second);
-    let errors = array(first - targets[index], second - targets[index]);
-    let weight = loss_weight(result, targets[index]);
-    rendered[index] = result;
+    let errors = array(first - ray.color, second - ray.color);
+    let weight = loss_weight(result, ray.color);
     let further = depth_squared_error(distance) + spread_error(spread) + sparsity;
-    ray_errors[index] = weight * errors[0] * errors[1] + vec4(0.0, 0.0, 0.0, further);
+    ray_results[index] = RayResult(result, weight * errors[0] * errors[1] + vec4(0.0, 0.0, 0.0, further));
 
     // dL/dR of each estimate, of which the error of the other is a factor.
     let share = weight / (4.0 * f32(counters.rays_used));
@@ -81,9 +74,9 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var missing = vec2(opacity(tail));
     for (var i = end; i > span.x; i--) {
         let known = d_color_load(i - 1u);
-        let gains = kept_gains_load(i - 1u);
+        let gains = kept_gains(i - 1u);
         let gain = 0.5 * (gains.x + gains.y);
-        let part = passage(known.x, kept_steps_load(i - 1u).z, gain);
+        let part = passage(known.x, kept_step(i - 1u).z, gain);
         let color = vec4(color_load(i - 1u).rgb, 1.0);
         let alpha = part.alpha;
         let first = dot(d_results[0], gradient_color(alpha, color, behind[0]) - missing.x * color);

@@ -1,9 +1,10 @@
 // Ends a step: sums the errors of its rays and chooses the number of rays of the next one, so that the kept
-// samples meet their target and the marched ones fit. One workgroup. Needs: counters, usable.
+// samples meet their target and the marched ones fit. One workgroup. Needs: counters, ray_result,
+// usable.
 
 var<storage, read_write> counters: Counters;
 var<storage, read_write> dispatch: array<vec3<u32>>;
-var<storage, read> ray_errors: array<vec4<f32>>;
+var<storage, read> ray_results: array<RayResult>;
 var<workgroup> sums: array<vec4<f32>, 64>;
 
 @compute @workgroup_size(64)
@@ -11,7 +12,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     let rays = counters.rays_used;
     var sum = vec4(0.0);
     for (var i = thread; i < rays; i += 64u) {
-        sum += ray_errors[i];
+        sum += ray_results[i].errors;
     }
     sums[thread] = sum;
     workgroupBarrier();

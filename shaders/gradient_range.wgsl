@@ -1,10 +1,10 @@
 // The largest gradient of the encoding and the largest squared error, before any gradient is used.
-// Needs: counters, magnitude.
+// Needs: counters, ray_result, magnitude.
 
-var<storage, read> counters: Counters;
+var<uniform> counters: Counters;
 // Two levels in each.
 tensor<read> d_encoding: vec4<f32>;
-var<storage, read> ray_errors: array<vec4<f32>>;
+var<storage, read> ray_results: array<RayResult>;
 var<storage, read_write> gradient_range: array<atomic<u32>>;
 var<workgroup> most_gradient: atomic<u32>;
 var<workgroup> most_error: atomic<u32>;
@@ -13,7 +13,6 @@ var<workgroup> most_error: atomic<u32>;
 fn main(
     @builtin(global_invocation_id) id: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
-    @builtin(num_workgroups) groups: vec3<u32>,
 ) {
     if thread == 0u {
         atomicStore(&most_gradient, 0u);
@@ -27,8 +26,10 @@ fn main(
         }
         atomicMax(&most_gradient, own);
     }
-    for (var ray = id.x; ray < counters.rays_used; ray += groups.x * 64u) {
-        atomicMax(&most_error, magnitude_bits(ray_errors[ray]));
+    // As many threads as the dispatch over kept samples has; D3D12 does not tell the number of its workgroups.
+    let threads = workgroups(counters.kept, 64u).x * 64u;
+    for (var ray = id.x; ray < counters.rays_used; ray += threads) {
+        atomicMax(&most_error, magnitude_bits(ray_results[ray].errors));
     }
     workgroupBarrier();
     if thread == 0u {

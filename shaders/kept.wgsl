@@ -1,6 +1,6 @@
 // Writes the chosen samples of all rays one behind the other. Needs: counters, packing.
 
-var<storage, read> counters: Counters;
+var<uniform> counters: Counters;
 var<storage, read> ray_spans: array<vec2<u32>>;
 var<storage, read> kept_spans: array<vec2<u32>>;
 tensor<read> chosen: vec4<f32>;
@@ -17,8 +17,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let span = kept_spans[index];
     for (var i = 0u; i < span.y; i++) {
         let choice = chosen_load(first + i);
-        let sample = u32(choice.x);
-        kept_rows_store(span.x + i, vec2(sample, index));
-        pack(span.x + i, sample, choice);
+        kept_rows_store(span.x + i, vec2(u32(choice.x), index));
+        pack(span.x + i, index, choice);
     }
 }

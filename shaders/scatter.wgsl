@@ -1,7 +1,7 @@
 // The encoding's backward pass: adds each kept sample's gradient to the eight corners of its cells.
 // Needs: counters, grid, corners, usable.
 
-var<storage, read> counters: Counters;
+var<uniform> counters: Counters;
 tensor<read> samples: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
 // Two levels in each.

@@ -2,7 +2,7 @@
 // in their order, so that nothing collides and every sum is the same in every run. For adapters with few
 // threads, where it is three times as fast as atomics. Needs: counters, grid, corners, usable.
 
-var<storage, read> counters: Counters;
+var<uniform> counters: Counters;
 tensor<read> samples: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
 // Two levels in each.

@@ -7,7 +7,7 @@
 // Nothing is kept behind the point where the ray is opaque; see `reference::selection`.
 // Needs: random, step, counters, exp, density, occupancy, occupancy_raise.
 
-var<storage, read> counters: Counters;
+var<uniform> counters: Counters;
 tensor<read> samples: vec4<f32>;
 tensor<read> density_out: vec4<f32>;
 var<storage, read> ray_spans: array<vec2<u32>>;

@@ -1,18 +1,15 @@
 // Begins the rays of the next pixels of a view where slots are free.
-// Needs: counters, progress, ray, camera, lens.
+// Needs: counters, progress, ray, view_ray, camera, lens.
 
-var<storage, read> counters: Counters;
-var<storage, read> progress: Progress;
-var<storage, read> cameras: array<Camera>;
+var<uniform> counters: Counters;
+var<uniform> progress: Progress;
+var<uniform> view_camera: Camera;
 // How many free slots are in front of it, and 1 where the slot is free.
 var<storage, read> view_slots: array<vec2<u32>>;
-// The pixel of each slot's ray; NO_PIXEL where there is none.
-tensor<write> view_pixels: u32;
-var<storage, read_write> ray_rounds: array<vec2<u32>>;
-// Optical depth, opacity, that of the samples that have no colour yet, and the sum of weighted depths.
+var<storage, read_write> view_rays: array<ViewRay>;
+// Two for each ray: optical depth, opacity, that of the samples that have no colour yet, and the sum of weighted
+// depths; then the sum of weighted colours.
 tensor<write> ray_states: vec4<f32>;
-// Sum of the weighted colours.
-tensor<write> ray_colors: vec4<f32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -22,15 +19,12 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let pixel = progress.first_pixel + view_slots[index].x;
     if pixel >= progress.next_pixel {
-        view_pixels_store(index, NO_PIXEL);
-        ray_rounds[index] = vec2(MAX_STEPS);
+        view_rays[index] = ViewRay(NO_PIXEL, MAX_STEPS, MAX_STEPS);
         return;
     }
-    let camera = cameras[0];
-    let center = vec2(f32(pixel % camera.width), f32(pixel / camera.width)) + 0.5;
-    ray_store(index, camera_ray(camera, center));
-    view_pixels_store(index, pixel);
-    ray_rounds[index] = vec2(0u);
-    ray_states_store(index, vec4(0.0));
-    ray_colors_store(index, vec4(0.0));
+    let center = vec2(f32(pixel % view_camera.width), f32(pixel / view_camera.width)) + 0.5;
+    ray_store(index, camera_ray(view_camera, center));
+    view_rays[index] = ViewRay(pixel, 0u, 0u);
+    ray_states_store(2u * index, vec4(0.0));
+    ray_states_store(2u * index + 1u, vec4(0.0));
 }

@@ -1,15 +1,15 @@
 // Adds the samples of a round to the optical depth, opacity and depth of a view's rays, and decides which of them get
 // colour: wherever the weights since the last one sum to COLOR_WEIGHT. That sample's colour stands for theirs.
 // A ray ends where it is opaque or leaves the box.
-// Needs: counters, camera, lens, exp, density, transmittance.
+// Needs: counters, view_ray, camera, lens, exp, density, transmittance.
 
-var<storage, read> counters: Counters;
-var<storage, read> cameras: array<Camera>;
+var<uniform> counters: Counters;
+var<uniform> view_camera: Camera;
 tensor<read> samples: vec4<f32>;
 tensor<read> density_out: vec4<f32>;
-tensor<read> view_pixels: u32;
 var<storage, read> ray_spans: array<vec2<u32>>;
-var<storage, read> ray_rounds: array<vec2<u32>>;
+var<storage, read> view_rays: array<ViewRay>;
+// As `view_rays` begins them.
 tensor<read_write> ray_states: vec4<f32>;
 var<storage, read_write> kept_spans: array<vec2<u32>>;
 // The samples with colour of ray r from index ray_spans[r].x on: sample (as a number), and the weight it stands for.
@@ -23,19 +23,18 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if index >= counters.rays_used {
         return;
     }
-    if view_pixels_load(index) == NO_PIXEL {
+    if view_rays[index].pixel == NO_PIXEL {
         kept_spans[index] = vec2(0u);
         return;
     }
-    let camera = cameras[0];
     let span = ray_spans[index];
-    let state = ray_states_load(index);
+    let state = ray_states_load(2u * index);
     var depth = state.x;
     var alpha = state.y;
     var pending = state.z;
     var distance = state.w;
     var count = 0u;
-    var ended = ray_rounds[index].y >= MAX_STEPS;
+    var ended = view_rays[index].next_step >= MAX_STEPS;
     var i = span.x;
     while i < span.x + span.y {
         let sample = samples_load(i);
@@ -43,7 +42,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let weight = exp_accurate(-transmittance_depth(depth, tau)) * opacity(tau);
         alpha += weight;
         pending += weight;
-        distance += weight * lens_depth(camera, sample.xyz - camera.origin);
+        distance += weight * lens_depth(view_camera, sample.xyz - view_camera.origin);
         if pending >= COLOR_WEIGHT {
             chosen_store(span.x + count, vec4(f32(i), pending, 0.0, 0.0));
             count++;
@@ -62,7 +61,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         count = 1u;
         pending = 0.0;
     }
-    ray_states_store(index, vec4(depth, alpha, pending, distance));
+    ray_states_store(2u * index, vec4(depth, alpha, pending, distance));
     kept_spans[index] = vec2(0u, count);
     view_slots[index] = vec2(0u, u32(ended));
 }

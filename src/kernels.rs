@@ -28,7 +28,7 @@ mod workspace;
 
 pub use constants::{RELATIVE_FLOOR, STEP_GROWTH, STEP_SHRINKAGE, dimension};
 pub use needs::Needs;
-pub use shared::{Camera, Counters, Progress, Step};
+pub use shared::{Camera, Counters, Progress, RayResult, RayTarget, Step};
 pub use workspace::Workspace;
 
 use crate::config::{Accumulation, Background, ColorLoss, Config, Transmittance};
@@ -52,6 +52,10 @@ pub(crate) const SINE: Part = part!("common/sine.wgsl");
 pub(crate) const CAMERA: Part = part!("common/camera.wgsl");
 const RAY_LOAD: Part = part!("common/ray_load.wgsl");
 const RAY_STORE: Part = part!("common/ray_store.wgsl");
+const RAY_TARGET: Part = part!("common/ray_target.wgsl");
+const RAY_RESULT: Part = part!("common/ray_result.wgsl");
+const KEPT_LOAD: Part = part!("common/kept_load.wgsl");
+const VIEW_RAY: Part = part!("common/view_ray.wgsl");
 const OCCUPANCY: Part = part!("common/occupancy.wgsl");
 const OCCUPANCY_RAISE: Part = part!("common/occupancy_raise.wgsl");
 const MARCH_START: Part = part!("common/march_start.wgsl");
@@ -230,6 +234,8 @@ impl Plan {
             (STEP, Step::LAYOUT),
             (COUNTERS, Counters::LAYOUT),
             (PROGRESS, Progress::LAYOUT),
+            (RAY_TARGET, RayTarget::LAYOUT),
+            (RAY_RESULT, RayResult::LAYOUT),
             (CAMERA, Camera::LAYOUT),
             (GRID, Level::LAYOUT),
         ];
@@ -290,6 +296,14 @@ impl Plan {
 
     fn depth_loss(&self) -> Part {
         if self.needs.depth { part!("depth_loss/squared.wgsl") } else { part!("depth_loss/none.wgsl") }
+    }
+
+    /// The distance of a kept sample, where the loss has use for it.
+    fn distance(&self) -> &'static [Part] {
+        match self.needs.depth || self.config.loss.distortion > 0.0 {
+            true => &[RAY, RAY_LOAD, part!("distance/along.wgsl")],
+            false => &[part!("distance/none.wgsl")],
+        }
     }
 
     fn distortion(&self) -> Part {

@@ -122,12 +122,13 @@ impl Renderer {
         let mut color = Vec::with_capacity(pixels);
         let mut depth = Vec::with_capacity(pixels);
         let camera_in_box = kernels::Camera::in_box(camera, &self.bounds);
-        self.workspace.write(&self.gpu, "cameras", &[camera_in_box]);
+        self.workspace.write(&self.gpu, "view_camera", &[camera_in_box]);
         while color.len() < pixels {
             let band = self.plan.rounds.band.min(pixels - color.len());
             self.render_band(color.len()..color.len() + band)?;
-            color.extend(self.workspace.read::<[f32; 4]>(&self.gpu, "view_color", band)?);
-            depth.extend(self.workspace.read::<f32>(&self.gpu, "view_depth", band)?);
+            let pixels: Vec<viewing::Pixel> = self.workspace.read(&self.gpu, "view_pixels", band)?;
+            color.extend(pixels.iter().map(|&[r, g, b, alpha, _]| [r, g, b, alpha]));
+            depth.extend(pixels.iter().map(|&[.., depth]| depth));
         }
         let grey = self.plan.needs.grey;
         color.iter_mut().flat_map(|pixel| &mut pixel[..3]).for_each(|value| *value *= grey);

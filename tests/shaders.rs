@@ -14,9 +14,9 @@ use nerf::gpu::source::{Linked, Source};
 use nerf::gpu::tensor::Memory;
 use nerf::kernels::layer::Product;
 use nerf::kernels::training::Tile;
-use nerf::kernels::{Camera, Counters, Needs, Plan, Progress, Step, Traits, photos};
+use nerf::kernels::{Camera, Counters, Needs, Plan, Progress, RayResult, RayTarget, Step, Traits, photos};
 use nerf::model::{Layout, Level};
-use wgpu::naga;
+use wgpu::{BindingType, naga};
 
 /// A file of WGSL: its name below `shaders` and its text.
 type File = (String, String);
@@ -99,8 +99,16 @@ struct Linker {
 }
 
 /// The structs that Rust and WGSL share.
-const SHARED: [StructLayout; 6] =
-    [Step::LAYOUT, Counters::LAYOUT, Progress::LAYOUT, Camera::LAYOUT, Level::LAYOUT, Tile::LAYOUT];
+const SHARED: [StructLayout; 8] = [
+    Step::LAYOUT,
+    Counters::LAYOUT,
+    Progress::LAYOUT,
+    RayTarget::LAYOUT,
+    RayResult::LAYOUT,
+    Camera::LAYOUT,
+    Level::LAYOUT,
+    Tile::LAYOUT,
+];
 
 impl Linker {
     fn new(plan: Plan) -> Self {
@@ -108,7 +116,7 @@ impl Linker {
         // What reads the photos depends on how many banks they fill.
         let capacity = Capacity::of(&wgpu::Limits::default(), plan.memory);
         let photos = |banks| (format!("photos in {banks} banks"), capacity.part(photos::NAME, banks));
-        parts.extend([photos(1), photos(3)]);
+        parts.extend([photos(1), photos(capacity.banks())]);
         parts.extend(lens_choices());
         let mut definers: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for (index, (_, text)) in parts.iter().enumerate() {
@@ -157,6 +165,32 @@ impl Linker {
         }
     }
 
+    /// Every kernel runs on an adapter that has what WebGPU guarantees, and no more.
+    fn check_bindings(&self, linked: &Linked, chosen: &[usize]) {
+        let limits = wgpu::Limits::default();
+        let storage = |kind: &BindingType| {
+            matches!(kind, BindingType::Buffer { ty: wgpu::BufferBindingType::Storage { .. }, .. })
+        };
+        let kinds: [(&str, fn(&BindingType) -> bool, u32); 3] = [
+            ("storage buffers", storage, limits.max_storage_buffers_per_shader_stage),
+            (
+                "storage textures",
+                |kind| matches!(kind, BindingType::StorageTexture { .. }),
+                limits.max_storage_textures_per_shader_stage,
+            ),
+            (
+                "textures",
+                |kind| matches!(kind, BindingType::Texture { .. }),
+                limits.max_sampled_textures_per_shader_stage,
+            ),
+        ];
+        for (name, is_counted, most) in kinds {
+            let count = bindings(linked, is_counted);
+            let parts: Vec<_> = chosen.iter().map(|&part| &self.parts[part].0).collect();
+            assert!(count <= most as usize, "{} with {parts:?} has {count} {name}, of {most}", linked.label);
+        }
+    }
+
     fn check(&mut self, linked: &Linked, chosen: &[usize]) {
         self.combinations += 1;
         self.used.extend(chosen.iter().map(|&part| self.parts[part].0.clone()));
@@ -164,6 +198,7 @@ impl Linker {
         assert!(entry.len() == 1 && entry[0].name == "main", "{}", linked.label);
         let names: BTreeSet<&str> = linked.bindings.iter().map(|binding| binding.name.as_str()).collect();
         assert_eq!(names.len(), linked.bindings.len(), "{}: {names:?}", linked.label);
+        self.check_bindings(linked, chosen);
         for layout in SHARED {
             let found =
                 linked.module.types.iter().find(|(_, kind)| kind.name.as_deref() == Some(layout.name));
@@ -173,6 +208,11 @@ impl Linker {
             }
         }
     }
+}
+
+/// How many bindings of a kind a module has.
+fn bindings(linked: &Linked, is_counted: fn(&BindingType) -> bool) -> usize {
+    linked.bindings.iter().filter(|binding| is_counted(&binding.kind)).count()
 }
 
 fn compare(label: &str, kind: &naga::Type, layout: StructLayout) {
@@ -227,6 +267,7 @@ fn variants_are_interchangeable() {
         "background",
         "depth_loss",
         "depth_target",
+        "distance",
         "extent",
         "loss",
         "pixels",

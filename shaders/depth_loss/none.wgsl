@@ -4,7 +4,7 @@ struct DepthRay {
     unused: u32,
 }
 
-fn depth_begin(ray: u32) -> DepthRay {
+fn depth_begin(goal: f32) -> DepthRay {
     return DepthRay(0u);
 }
 

@@ -1,31 +1,23 @@
-// Needs: counters, sum, transmittance, behind_next, ray_load, kept_distance. Provides: the depth's share of the loss, DEPTH_WEIGHT / M times the
-// square of sum_i w_i (t_i - g) over the rays whose distance g is known. It is a fifth channel whose colour is t_i - g,
-// over 0: what is transparent is left to the other channels. Distances are in sides of the inner cube.
-
-// 0 where unknown.
-var<storage, read> depth_targets: array<f32>;
+// Needs: counters, sum, transmittance, behind_next, kept_load. Provides: the depth's share of the loss, DEPTH_WEIGHT / M
+// times the square of sum_i w_i (t_i - g) over the rays whose distance g is known. It is a fifth channel whose colour is
+// t_i - g, over 0: what is transparent is left to the other channels. Distances are in sides of the inner cube.
 
 struct DepthRay {
-    origin: vec3<f32>,
+    // 0 where unknown.
     goal: f32,
-    direction: vec3<f32>,
-    unused: f32,
     // On the way there the channel in x, on the way back what lies behind.
     sum: Sum,
     // dL/dR of the channel.
     d_result: f32,
 }
 
-fn depth_begin(ray: u32) -> DepthRay {
-    let goal = depth_targets[ray];
-    let line = ray_load(ray);
-    return DepthRay(line.origin, goal, line.direction, 0.0, sum_of(vec4(0.0)), 0.0);
+fn depth_begin(goal: f32) -> DepthRay {
+    return DepthRay(goal, sum_of(vec4(0.0)), 0.0);
 }
 
 // The channel's colour of a sample.
 fn depth_offset(depth: DepthRay, i: u32) -> vec4<f32> {
-    let distance = kept_distance(depth.origin, depth.direction, i);
-    return vec4(select(0.0, distance - depth.goal, depth.goal > 0.0), 0.0, 0.0, 0.0);
+    return vec4(select(0.0, kept_step(i).w - depth.goal, depth.goal > 0.0), 0.0, 0.0, 0.0);
 }
 
 fn depth_forward(depth: DepthRay, i: u32, root: f32, alpha: f32, zero: u32) -> DepthRay {

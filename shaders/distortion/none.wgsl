@@ -4,7 +4,7 @@ struct SpreadRay {
     unused: u32,
 }
 
-fn spread_begin(ray: u32) -> SpreadRay {
+fn spread_begin() -> SpreadRay {
     return SpreadRay(0u);
 }
 

@@ -1,11 +1,9 @@
-// Needs: counters, sum, transmittance, behind_next, ray_load, kept_distance. Provides: the distortion's share of the loss (Barron et al. 2022,
-// eq. 15), DISTORTION / M times sum_ij w_i w_j |x_i - x_j| + 1/3 sum_i w_i^2 dx_i: it pulls the weights of a ray together.
-// x = t / (1 + t), with t in sides of the inner cube. Its slope by w_i is the colour of a further channel over 0.
-// See `reference::loss`.
+// Needs: counters, sum, transmittance, behind_next, kept_load. Provides: the distortion's share of the loss (Barron et
+// al. 2022, eq. 15), DISTORTION / M times sum_ij w_i w_j |x_i - x_j| + 1/3 sum_i w_i^2 dx_i: it pulls the weights of a ray
+// together. x = t / (1 + t), with t in sides of the inner cube. Its slope by w_i is the colour of a further channel over
+// 0. See `reference::loss`.
 
 struct SpreadRay {
-    origin: vec3<f32>,
-    direction: vec3<f32>,
     // Sums of w and of w x: on the way there of the samples so far, on the way back of those behind.
     sums: vec2<f32>,
     error: f32,
@@ -13,16 +11,15 @@ struct SpreadRay {
     behind: Sum,
 }
 
-fn spread_begin(ray: u32) -> SpreadRay {
-    let line = ray_load(ray);
-    return SpreadRay(line.origin, line.direction, vec2(0.0), 0.0, sum_of(vec4(0.0)));
+fn spread_begin() -> SpreadRay {
+    return SpreadRay(vec2(0.0), 0.0, sum_of(vec4(0.0)));
 }
 
 // x of a sample, and how long its step is there.
-fn spread_place(spread: SpreadRay, i: u32) -> vec2<f32> {
-    let t = kept_distance(spread.origin, spread.direction, i);
-    let scale = 1.0 / (1.0 + t);
-    return vec2(t * scale, kept_steps_load(i).y * scale * scale);
+fn spread_place(i: u32) -> vec2<f32> {
+    let kept = kept_step(i);
+    let scale = 1.0 / (1.0 + kept.w);
+    return vec2(kept.w * scale, kept.y * scale * scale);
 }
 
 fn spread_before(spread: SpreadRay) -> vec2<f32> {
@@ -30,7 +27,7 @@ fn spread_before(spread: SpreadRay) -> vec2<f32> {
 }
 
 fn spread_forward(spread: SpreadRay, i: u32, weight: f32) -> SpreadRay {
-    let place = spread_place(spread, i);
+    let place = spread_place(i);
     var next = spread;
     next.error += weight * (2.0 * (place.x * spread.sums.x - spread.sums.y) + weight * place.y / 3.0);
     next.sums += weight * vec2(1.0, place.x);
@@ -50,7 +47,7 @@ fn spread_turn(spread: SpreadRay) -> SpreadRay {
 
 // The slope by the weight of a sample, from the sums before it.
 fn spread_slope(spread: SpreadRay, i: u32, before: vec2<f32>, weight: f32) -> vec4<f32> {
-    let place = spread_place(spread, i);
+    let place = spread_place(i);
     let front = place.x * before.x - before.y;
     let back = spread.sums.y - place.x * spread.sums.x;
     let slope = 2.0 * (front + back) + 2.0 * weight * place.y / 3.0;
@@ -66,6 +63,6 @@ fn spread_gradient(spread: SpreadRay, i: u32, before: vec2<f32>, weight: f32, al
 fn spread_backward(spread: SpreadRay, i: u32, before: vec2<f32>, weight: f32, part: Passage, zero: u32) -> SpreadRay {
     var next = spread;
     next.behind = behind_next(spread.behind, spread_slope(spread, i, before, weight), part, zero);
-    next.sums += weight * vec2(1.0, spread_place(spread, i).x);
+    next.sums += weight * vec2(1.0, spread_place(i).x);
     return next;
 }

@@ -1,17 +1,17 @@
 // Provides: the steps of a ray that are marched at once: those of a round, from where the round before ended up to
-// `progress.quota` samples. A ray whose next step is MAX_STEPS has none left. Needs: progress.
+// `progress.quota` samples. A ray whose next step is MAX_STEPS has none left. Needs: progress,
+// view_ray.
 
-var<storage, read> progress: Progress;
-// Steps of each ray: the first of this round, and the first of the next.
-var<storage, read_write> ray_rounds: array<vec2<u32>>;
+var<uniform> progress: Progress;
+var<storage, read_write> view_rays: array<ViewRay>;
 
 // The first step to march, and the first of those that were marched.
 fn extent_begin(index: u32) -> u32 {
-    return ray_rounds[index].y;
+    return view_rays[index].next_step;
 }
 
 fn extent_first(index: u32) -> u32 {
-    return ray_rounds[index].x;
+    return view_rays[index].first_step;
 }
 
 // Most samples of a ray.
@@ -21,5 +21,6 @@ fn extent_most() -> u32 {
 
 // Marching ended in front of step `next`; MAX_STEPS where it left the box.
 fn extent_end(index: u32, next: u32) {
-    ray_rounds[index] = vec2(ray_rounds[index].y, next);
+    view_rays[index].first_step = view_rays[index].next_step;
+    view_rays[index].next_step = next;
 }

@@ -1,6 +1,6 @@
 // Provides: the rows of a layer that runs over the kept samples. Needs: counters.
 
-var<storage, read> counters: Counters;
+var<uniform> counters: Counters;
 
 fn layer_count() -> u32 {
     return counters.kept;

@@ -1,15 +1,15 @@
-// Needs: counters, exp, log. Provides: the sparsity's share of the loss, SPARSITY / M times the sum of
+// Needs: counters, exp, log, kept_load. Provides: the sparsity's share of the loss, SPARSITY / M times the sum of
 // (1 - T) d ln(1 + sigma / sigma_0): what is hidden by what lies in front of it need not be there. 1 - T is a constant as
 // far as gradients go. A kept sample stands for as many as it has gain. See `reference::loss`.
 
 // What of it a sample has, but for the function of its density.
 fn sparsity_part(i: u32, root: f32, gain: f32) -> f32 {
     // The root is that of T.
-    return SPARSITY * gain * (1.0 - root * root) * kept_steps_load(i).y;
+    return SPARSITY * gain * (1.0 - root * root) * kept_step(i).y;
 }
 
 fn sparsity_density(i: u32) -> f32 {
-    return exp_accurate(kept_steps_load(i).x) / SPARSE_DENSITY;
+    return exp_accurate(kept_step(i).x) / SPARSE_DENSITY;
 }
 
 // As a part of a ray's squared errors, of which the loss is a quarter.

@@ -85,16 +85,15 @@ impl Fused {
         let bench = &self.bench;
         bench.run([&self.stage])?;
         let samples = rays.iter().map(|ray| ray.s.len()).sum();
-        let rendered: Vec<[f32; 4]> = bench.read("rendered", rays.len())?;
-        let errors: Vec<[f32; 4]> = bench.read("ray_errors", rays.len())?;
+        let results = bench.results(rays.len())?;
         let gradients: Vec<[f32; 4]> = bench.read("d_color", samples)?;
         let weights: Vec<f32> = bench.read("weights", samples)?;
         let output = |(index, ray): (usize, &CompositeInput<'_>)| {
             let [first, count] = spans[index].map(|x| x as usize);
             let range = first..first + count;
-            let loss_terms = errors[index].map(f64::from);
+            let loss_terms = results[index].errors.map(f64::from);
             let gradients = &gradients[range.clone()];
-            let rendered = rendered[index].map(f64::from);
+            let rendered = results[index].rendered.map(f64::from);
             CompositeOutput {
                 rendered,
                 loss_terms,
@@ -116,14 +115,10 @@ impl Fused {
             steps.extend(ray.s.iter().zip(ray.delta).map(|(&s, &delta)| [s as f32, delta as f32]));
             colors.extend(ray.color.iter().map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 0.0]));
         }
-        let targets: Vec<_> = rays.iter().map(|ray| ray.target.map(|x| x as f32)).collect();
-        let backgrounds: Vec<_> =
-            rays.iter().map(|ray| ray.background.map(|x| x as f32)).map(|[r, g, b]| [r, g, b, 0.0]).collect();
         let bench = &self.bench;
         bench.set_kept_steps(&steps);
         bench.write("color", &colors);
-        bench.write("targets", &targets);
-        bench.write("backgrounds", &backgrounds);
+        bench.set_targets(rays.iter().map(|ray| (ray.target, ray.background, 0.0)));
         // The batch may have more rays than these: the other threads find no samples.
         spans.resize(rays.len().next_multiple_of(GROUP), [0, 0]);
         bench.write("kept_spans", &spans);

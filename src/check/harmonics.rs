@@ -20,8 +20,8 @@ pub fn harmonics(subject: &Subject) -> Result<Tally> {
     let count = directions.len();
     let features = random.numbers(count * DENSITY_OUTPUTS, -1e3, 1e3);
     let rows: Vec<_> = (0..count as u32).map(|ray| [(ray * 7) % count as u32, ray]).collect();
-    let directions_and_end: Vec<_> = directions.iter().map(|d| d.as_vec3().extend(1.0).to_array()).collect();
-    bench.write("ray_directions", &directions_and_end);
+    let lines: Vec<_> = directions.iter().map(|d| [[0.0; 4], d.as_vec3().extend(1.0).to_array()]).collect();
+    bench.set_rays_along(&lines);
     bench.write("density_out", &features);
     bench.write("kept_rows", &rows);
     bench.set_counters(Counters { kept: count as u32, ..Counters::default() });

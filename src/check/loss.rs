@@ -1,6 +1,7 @@
 //! The fused kernel with everything that a loss may have: errors relative to the colour, depth, distortion and sparsity.
 
 use super::draw::Random;
+use super::workbench::KeptStep;
 use super::{Setup, Subject, Tally};
 use crate::config::{ColorLoss, Loss};
 use crate::kernels::{Counters, training};
@@ -9,7 +10,6 @@ use crate::reference::composite::{CompositeInput, CompositeOutput, optical_depth
 use crate::reference::loss::{Places, SPARSE_DENSITY, composite_with, distortion};
 use crate::reference::model::Objective;
 use anyhow::Result;
-use std::iter::repeat_n;
 
 /// Smaller gradients may vanish in single precision.
 const LEAST: f64 = 1e-30;
@@ -86,10 +86,16 @@ impl Case {
             upload(&bench, &rays, &spans);
             bench.run([&training::composite(&bench.gpu, &bench.plan, &bench.workspace, true)?])?;
             let gradients: Vec<[f32; 4]> = bench.read("d_color", first as usize)?;
-            let errors: Vec<[f32; 4]> = bench.read("ray_errors", rays.len())?;
+            let results = bench.results(rays.len())?;
             for (number, (ray, [first, count])) in rays.iter().zip(spans).enumerate() {
                 let range = first as usize..(first + count) as usize;
-                ray.compare(&mut tally, &bench.objective(), &gradients[range], errors[number], number);
+                ray.compare(
+                    &mut tally,
+                    &bench.objective(),
+                    &gradients[range],
+                    results[number].errors,
+                    number,
+                );
             }
         }
         Ok(tally)
@@ -98,31 +104,16 @@ impl Case {
 
 fn upload(bench: &super::Workbench, rays: &[Ray], spans: &[[u32; 2]]) {
     let all = |value: fn(&Ray) -> Vec<[f32; 4]>| rays.iter().flat_map(value).collect::<Vec<_>>();
-    let steps: Vec<[f32; 2]> = rays
-        .iter()
-        .flat_map(|ray| ray.s.iter().zip(&ray.delta))
-        .map(|(&s, &d)| [s as f32, d as f32])
-        .collect();
-    bench.set_kept_steps(&steps);
+    let step = |((&s, &delta), &distance): ((&f64, &f64), &f64)| {
+        [[s as f32, delta as f32, 0.0, distance as f32], [1.0, 1.0, 0.0, 0.0]]
+    };
+    let steps: Vec<KeptStep> =
+        rays.iter().flat_map(|ray| ray.s.iter().zip(&ray.delta).zip(&ray.distances).map(step)).collect();
+    bench.write("kept_steps", &steps);
     bench.write("color", &all(|ray| ray.color.iter().map(|c| narrow([c[0], c[1], c[2], 0.0])).collect()));
-    // All rays go along x; a sample's row is its own number.
-    bench.write("samples", &all(|ray| ray.distances.iter().map(|&t| [t as f32, 0.0, 0.0, 0.0]).collect()));
-    let rows: Vec<[u32; 2]> = spans
-        .iter()
-        .zip(0..)
-        .flat_map(|(span, ray)| repeat_n(ray, span[1] as usize))
-        .zip(0..)
-        .map(|(ray, row)| [row, ray])
-        .collect();
-    bench.write("kept_rows", &rows);
-    bench.write("ray_origins", &vec![[0.0_f32; 4]; rays.len()]);
-    bench.write("ray_directions", &vec![[1.0_f32, 0.0, 0.0, 0.0]; rays.len()]);
-    bench.write("depth_targets", &rays.iter().map(|ray| ray.goal as f32).collect::<Vec<_>>());
-    bench.write("targets", &rays.iter().map(|ray| narrow(ray.target)).collect::<Vec<_>>());
-    let behind = |ray: &Ray| narrow([ray.background[0], ray.background[1], ray.background[2], 0.0]);
-    bench.write("backgrounds", &rays.iter().map(behind).collect::<Vec<_>>());
+    bench.set_targets(rays.iter().map(|ray| (ray.target, ray.background, ray.goal)));
     bench.write("kept_spans", spans);
-    let (count, kept) = (rays.len() as u32, rows.len() as u32);
+    let (count, kept) = (rays.len() as u32, steps.len() as u32);
     bench.set_counters(Counters { rays: count, rays_used: count, kept, ..Counters::default() });
 }
 

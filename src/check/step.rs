@@ -7,7 +7,7 @@ use crate::camera::{Camera, Lens};
 use crate::config::{Background, Loss, Optimizer, Selection};
 use crate::dataset::{Bounds, Photo};
 use crate::image::{Image, Pixels};
-use crate::kernels::{Needs, STEP_GROWTH, STEP_SHRINKAGE};
+use crate::kernels::{Needs, RayTarget, STEP_GROWTH, STEP_SHRINKAGE};
 use crate::model::DENSITY_OUTPUTS;
 use crate::reference::Transmittance;
 use crate::reference::activation::log_density;
@@ -228,12 +228,7 @@ impl TinyTraining {
         let density = bench.density(samples.len())?;
         let spans: Vec<[u32; 2]> = bench.read("ray_spans", rays)?;
         let directions = bench.rays(rays)?;
-        let targets: Vec<[f32; 4]> = bench.read("targets", rays)?;
-        let backgrounds: Vec<[f32; 4]> = bench.read("backgrounds", rays)?;
-        let depths: Vec<f32> = match bench.plan.needs.depth {
-            true => bench.read("depth_targets", rays)?,
-            false => vec![0.0; rays],
-        };
+        let targets: Vec<RayTarget> = bench.read("ray_targets", rays)?;
         let scale = bench.plan.density_scale();
         let vector = |x: &[f32; 4]| DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
         let sample = |index: usize, ray: usize| {
@@ -260,9 +255,9 @@ impl TinyTraining {
             .map(|ray| TrainingRay {
                 direction: vector(&directions[ray][1]),
                 samples: of_ray(ray),
-                target: targets[ray].map(f64::from),
-                background: vector(&backgrounds[ray]).to_array(),
-                depth: f64::from(depths[ray]),
+                target: targets[ray].color.map(f64::from),
+                background: targets[ray].background.map(f64::from),
+                depth: f64::from(targets[ray].depth),
             })
             .collect())
     }

@@ -5,6 +5,7 @@ use super::draw::Random;
 use super::fused::{BOUND, Fused, SAMPLES};
 use super::hard_rays::HardRay;
 use super::subject::Subject;
+use super::workbench::KeptStep;
 use crate::reference::Transmittance;
 use crate::reference::composite::{CompositeInput, CompositeOutput, opacity, optical_depths, transmittances};
 use crate::reference::loss::{Loss, Places, composite_with};
@@ -40,11 +41,7 @@ pub(super) fn thinned_rays(subject: &Subject) -> Result<Tally> {
             (0..4 * HardRay::KINDS).map(|number| ThinnedRay::new(&mut random, number, length)).collect();
         let inputs: Vec<_> = rays.iter().map(|ray| ray.ray.input(rays.len() as u32)).collect();
         let spans = fused.upload(&inputs);
-        let all = |value: fn(&ThinnedRay) -> Vec<[f32; 4]>| rays.iter().flat_map(value).collect::<Vec<_>>();
-        fused.bench.write("kept_steps", &all(ThinnedRay::steps));
-        let gains: Vec<[f32; 2]> =
-            rays.iter().flat_map(|ray| &ray.gains).map(|gains| gains.map(|gain| gain as f32)).collect();
-        fused.bench.write("kept_gains", &gains);
+        fused.bench.write("kept_steps", &rays.iter().flat_map(ThinnedRay::steps).collect::<Vec<_>>());
         fused.bench.write("ray_tails", &rays.iter().map(|ray| ray.tail as f32).collect::<Vec<_>>());
         for (ray, got) in rays.iter().zip(fused.outputs(&inputs, &spans)?) {
             ray.compare(&mut tally, &got, rays.len() as u32);
@@ -85,9 +82,13 @@ impl ThinnedRay {
     }
 
     /// As the kernel takes them.
-    fn steps(&self) -> Vec<[f32; 4]> {
-        let samples = self.ray.s.iter().zip(&self.ray.delta).zip(&self.gaps);
-        samples.map(|((&s, &delta), &gap)| [s as f32, delta as f32, gap as f32, 0.0]).collect()
+    fn steps(&self) -> Vec<KeptStep> {
+        let step = |k: usize| {
+            let [first, second] = self.gains[k].map(|gain| gain as f32);
+            let [s, delta, gap] = [self.ray.s[k], self.ray.delta[k], self.gaps[k]].map(|x| x as f32);
+            [[s, delta, gap, 0.0], [first, second, 0.0, 0.0]]
+        };
+        (0..self.gaps.len()).map(step).collect()
     }
 
     /// The ray with a sample in each gap, and one behind the last of its own: sample `k` is the `2k + 1`st.

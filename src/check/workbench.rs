@@ -5,7 +5,10 @@ use super::draw::quiet_step;
 use crate::gpu::Gpu;
 use crate::gpu::banks::{Banks, Capacity, rows_of};
 use crate::gpu::pass::Stage;
-use crate::kernels::{Counters, Plan, Step, Workspace, color, density, dispatch, marching, photos, training};
+use crate::kernels::{
+    Counters, Plan, RayResult, RayTarget, Step, Workspace, color, density, dispatch, marching, photos,
+    training,
+};
 use crate::model::DENSITY_OUTPUTS;
 use crate::reference::model::TrainingRay;
 use anyhow::{Context, Result, ensure};
@@ -28,6 +31,9 @@ pub struct Workbench {
 
 /// Rows of a bank of photos: so few that some photos lie in two banks.
 const BANK_ROWS: usize = 3;
+
+/// A kept sample as `shaders/common/kept_load.wgsl` reads it.
+pub(super) type KeptStep = [[f32; 4]; 2];
 
 /// A kept sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,9 +152,12 @@ impl Workbench {
     /// # Errors
     /// When the device was lost.
     pub fn rays(&self, count: usize) -> Result<Vec<[[f32; 4]; 2]>> {
-        let origins: Vec<[f32; 4]> = self.read("ray_origins", count)?;
-        let directions: Vec<[f32; 4]> = self.read("ray_directions", count)?;
-        Ok(origins.into_iter().zip(directions).map(|(origin, direction)| [origin, direction]).collect())
+        self.read("ray_lines", count)
+    }
+
+    /// Writes origin and `t_near`, direction and `t_far` of rays.
+    pub fn set_rays_along(&self, lines: &[[[f32; 4]; 2]]) {
+        self.write("ray_lines", lines);
     }
 
     /// The kept samples.
@@ -157,17 +166,23 @@ impl Workbench {
     /// When the device was lost.
     pub fn kept(&self, count: usize) -> Result<Vec<Kept>> {
         let rows: Vec<[u32; 2]> = self.read("kept_rows", count)?;
-        let steps: Vec<[f32; 4]> = self.read("kept_steps", count)?;
-        let gains: Vec<[f32; 2]> = self.read("kept_gains", count)?;
-        Ok((rows.into_iter().zip(steps).zip(gains))
-            .map(|(([sample, ray], [s, delta, gap, _]), gains)| Kept { sample, ray, s, delta, gap, gains })
+        let steps: Vec<KeptStep> = self.read("kept_steps", count)?;
+        Ok((rows.into_iter().zip(steps))
+            .map(|([sample, ray], [[s, delta, gap, _], [first, second, ..]])| Kept {
+                sample,
+                ray,
+                s,
+                delta,
+                gap,
+                gains: [first, second],
+            })
             .collect())
     }
 
     /// Log-densities and steps of the kept samples, as if all had been chosen.
     pub fn set_kept_steps(&self, steps: &[[f32; 2]]) {
-        self.write("kept_steps", &steps.iter().map(|&[s, delta]| [s, delta, 0.0, 0.0]).collect::<Vec<_>>());
-        self.write("kept_gains", &vec![[1.0_f32; 2]; steps.len()]);
+        let all = steps.iter().map(|&[s, delta]| [[s, delta, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]]);
+        self.write::<KeptStep>("kept_steps", &all.collect::<Vec<_>>());
     }
 
     /// Puts a batch on the device as if it had been drawn and marched.
@@ -192,24 +207,34 @@ impl Workbench {
             room.rays,
             room.samples
         );
-        let directions: Vec<[f32; 4]> =
-            rays.iter().map(|ray| ray.direction.as_vec3().extend(1.0).to_array()).collect();
-        let targets: Vec<_> = rays.iter().map(|ray| ray.target.map(|x| x as f32)).collect();
-        let backgrounds: Vec<_> =
-            rays.iter().map(|ray| ray.background.map(|x| x as f32)).map(|[r, g, b]| [r, g, b, 0.0]).collect();
-        if self.plan.needs.depth {
-            let depths: Vec<_> = rays.iter().map(|ray| ray.depth as f32).collect();
-            self.write("depth_targets", &depths);
-        }
-        self.write("ray_origins", &vec![[0.0_f32; 4]; rays.len()]);
-        self.write("ray_directions", &directions);
+        let line = |ray: &TrainingRay| [[0.0; 4], ray.direction.as_vec3().extend(1.0).to_array()];
+        self.set_rays_along(&rays.iter().map(line).collect::<Vec<_>>());
         self.write("ray_spans", &spans);
         self.write("samples", &samples);
-        self.write("targets", &targets);
-        self.write("backgrounds", &backgrounds);
+        self.set_targets(rays.iter().map(|ray| (ray.target, ray.background, ray.depth)));
         // The scan turns counts into spans and sets all dispatch sizes.
         self.set_rays(rays.len());
         self.run([&*self.scan])
+    }
+
+    /// What rays should show: colour and opacity, background, and distance.
+    pub fn set_targets(&self, targets: impl Iterator<Item = ([f64; 4], [f64; 3], f64)>) {
+        let targets: Vec<_> = targets
+            .map(|(color, background, depth)| RayTarget {
+                color: color.map(|x| x as f32),
+                background: background.map(|x| x as f32),
+                depth: depth as f32,
+            })
+            .collect();
+        self.write("ray_targets", &targets);
+    }
+
+    /// What rays showed.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn results(&self, rays: usize) -> Result<Vec<RayResult>> {
+        self.read("ray_results", rays)
     }
 
     /// Puts these words of photos on the device, in banks of a few rows.
@@ -217,8 +242,11 @@ impl Workbench {
     /// # Errors
     /// When the adapter cannot hold them.
     pub fn add_photos(&mut self, words: &[u32]) -> Result<()> {
-        let capacity = Capacity::of(&self.gpu.device.limits(), self.plan.memory).with_bank_rows(BANK_ROWS);
-        let mut banks = Banks::new(&self.gpu, photos::NAME, rows_of(words.len()), capacity)?;
+        let (capacity, rows) =
+            (Capacity::of(&self.gpu.device.limits(), self.plan.memory), rows_of(words.len()));
+        // More where the adapter binds few of them.
+        let capacity = capacity.with_bank_rows(BANK_ROWS.max(rows.div_ceil(capacity.banks())));
+        let mut banks = Banks::new(&self.gpu, photos::NAME, rows, capacity)?;
         banks.write(&self.gpu, 0, words)?;
         self.workspace.add_banks(banks);
         Ok(())
@@ -276,7 +304,7 @@ impl Workbench {
         Ok(Outcome {
             density: self.density(counters.samples as usize)?,
             color: self.color(counters.kept as usize)?,
-            rendered: self.read("rendered", counters.rays_used as usize)?,
+            rendered: self.results(counters.rays_used as usize)?.iter().map(|ray| ray.rendered).collect(),
             loss: f64::from(counters.sum_loss),
             d_table,
             d_weights: self.weights("mlp_first")?,

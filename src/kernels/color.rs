@@ -3,8 +3,8 @@
 use super::density::{forward, layer_stage};
 use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
 use super::{
-    COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, OCCUPANCY, OCCUPANCY_RAISE, Plan, RANDOM, STEP, Workspace,
-    dispatch, viewing,
+    COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, OCCUPANCY, OCCUPANCY_RAISE, Plan, RANDOM, RAY, RAY_LOAD,
+    STEP, Workspace, dispatch, viewing,
 };
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
@@ -44,12 +44,16 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
     let (select, packing) = match selection {
-        Selection::Training => (select(gpu, plan, workspace)?, part!("packing/training.wgsl")),
-        Selection::View => (viewing::select(gpu, plan, workspace)?, part!("packing/view.wgsl")),
+        Selection::Training => {
+            let packing = [&[DENSITY], plan.distance(), &[part!("packing/training.wgsl")]].concat();
+            (select(gpu, plan, workspace)?, packing)
+        }
+        Selection::View => (viewing::select(gpu, plan, workspace)?, vec![part!("packing/view.wgsl")]),
     };
-    let kept = [COUNTERS, DENSITY, packing, part!("kept.wgsl")];
+    let kept = [&[COUNTERS], packing.as_slice(), &[part!("kept.wgsl")]].concat();
     let kept = plan.ray_stage(gpu, workspace, "kept", &kept)?;
-    let input = plan.kernel(gpu, "color input", &[COUNTERS, HARMONICS, part!("color_input.wgsl")])?;
+    let parts = [COUNTERS, RAY, RAY_LOAD, HARMONICS, part!("color_input.wgsl")];
+    let input = plan.kernel(gpu, "color input", &parts)?;
     let input = Stage::indirect(workspace.bind(gpu, &input, &[])?, workspace.get("dispatch"), dispatch::KEPT);
     let mut stages = vec![select, scan(gpu, plan, workspace, Scanned::Kept)?, kept, input];
     stages.extend(network(gpu, plan, workspace)?);

@@ -2,7 +2,7 @@
 
 use super::{
     COUNTERS, Counters, MARCH_START, OCCUPANCY, PROGRESS, Part, Plan, RANDOM, RAY, RAY_LOAD, STEP, Step,
-    Workspace, dispatch,
+    VIEW_RAY, Workspace, dispatch,
 };
 use crate::config::Batch;
 use crate::gpu::Gpu;
@@ -19,13 +19,12 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     let batch = &plan.config.batch;
     vec![
         Demand::uniform::<Step>("step"),
-        Demand::storage::<Counters>("counters", 1),
+        Demand::uniform_storage::<Counters>("counters", 1),
         Demand::indirect("dispatch", dispatch::COUNT * 4),
         Demand::storage::<u32>("ray_steps", batch.rays * plan.step_words()),
         Demand::storage::<[u32; 2]>("ray_spans", batch.rays),
         Demand::storage::<[u32; 2]>("kept_spans", batch.rays),
-        plan.tensor("ray_origins", Element::Vec4, batch.rays),
-        plan.tensor("ray_directions", Element::Vec4, batch.rays),
+        plan.tensor("ray_lines", Element::Vec4, 2 * batch.rays),
         plan.tensor("samples", Element::Vec4, batch.samples + SPARE_ROWS),
     ]
 }
@@ -35,15 +34,15 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
 pub enum Extent {
     /// To the end of the box.
     Whole,
-    /// From where the round before ended, up to as many samples as the round allows: `ray_rounds` holds the first step
-    /// of each ray in this round and the first of the next, [`super::Progress::quota`] the most samples of a ray.
+    /// From where the round before ended, up to as many samples as the round allows: a
+    /// [`super::viewing`] ray knows its first step in this round and in the next, [`super::Progress::quota`] the most samples of a ray.
     Round,
 }
 
 impl Extent {
     fn parts(self) -> &'static [Part] {
         const WHOLE: &[Part] = &[part!("extent/whole.wgsl")];
-        const ROUND: &[Part] = &[PROGRESS, part!("extent/round.wgsl")];
+        const ROUND: &[Part] = &[PROGRESS, VIEW_RAY, part!("extent/round.wgsl")];
         match self {
             Self::Whole => WHOLE,
             Self::Round => ROUND,

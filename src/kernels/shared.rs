@@ -95,6 +95,28 @@ gpu_struct! {
 }
 
 gpu_struct! {
+    /// What a training ray should show; see `shaders/common/ray_target.wgsl`.
+    RayTarget {
+        /// Colour composited over the background, and opacity.
+        color: [f32; 4],
+        /// The background's colour.
+        background: [f32; 3],
+        /// Distance in sides of the inner cube; 0 where unknown.
+        depth: f32,
+    }
+}
+
+gpu_struct! {
+    /// What a training ray showed; see `shaders/common/ray_result.wgsl`.
+    RayResult {
+        /// Colour over the background, and opacity.
+        rendered: [f32; 4],
+        /// Squared errors of the four channels with their weights; opacity's also holds what further terms add.
+        errors: [f32; 4],
+    }
+}
+
+gpu_struct! {
     /// A camera in box space; see `shaders/common/camera.wgsl`.
     Camera {
         /// Position.

@@ -4,8 +4,8 @@ use super::color::COLOR_HIDDEN;
 use super::density::{layer_stage, quads};
 use super::marching::{SPARE_ROWS, kept_capacity};
 use super::{
-    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, Part, Plan, RANDOM, RAY, RAY_LOAD, RAY_STORE,
-    STEP, SUM, USABLE, Workspace, dispatch,
+    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, KEPT_LOAD, Part, Plan, RANDOM, RAY, RAY_RESULT,
+    RAY_STORE, RAY_TARGET, RayResult, RayTarget, STEP, SUM, USABLE, Workspace, dispatch,
 };
 use crate::config::Accumulation;
 use crate::gpu::Gpu;
@@ -45,9 +45,10 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
     // Integers of 64 bits take twice the room of floats.
     let words = if plan.accumulation == Accumulation::Fixed { 2 } else { 1 };
     let mut demands = vec![
-        plan.tensor("kept_steps", Element::Vec4, rows),
-        plan.tensor("kept_gains", Element::Vec2, rows),
+        plan.tensor("kept_steps", Element::Vec4, 2 * rows),
         Demand::storage::<f32>("ray_tails", batch.rays),
+        Demand::storage::<RayTarget>("ray_targets", batch.rays),
+        Demand::storage::<RayResult>("ray_results", batch.rays),
         plan.tensor("d_color", Element::Vec4, rows),
         plan.tensor("d_raw_color", Element::Vec4, rows),
         plan.tensor("d_density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
@@ -59,13 +60,8 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
         Demand::storage::<u32>("gradient_range", 3),
     ];
     demands.extend(plan.color_hidden(&D_COLOR_HIDDEN, rows));
-    let of_rays = ["targets", "backgrounds", "rendered", "ray_errors"];
-    demands.extend(of_rays.map(|name| Demand::storage::<[f32; 4]>(name, batch.rays)));
     let of_weights = ["mlp_first", "mlp_second", "d_weights"];
     demands.extend(of_weights.map(|name| Demand::storage::<[f32; 4]>(name, layout.quads)));
-    if plan.needs.depth {
-        demands.push(Demand::storage::<f32>("depth_targets", batch.rays));
-    }
     demands
 }
 
@@ -80,6 +76,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
         COUNTERS,
         RAY,
         RAY_STORE,
+        RAY_TARGET,
         CAMERA,
         plan.pixels(),
         plan.position(),
@@ -99,6 +96,9 @@ pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -
     let weights = if weights { part!("weights/stored.wgsl") } else { part!("weights/none.wgsl") };
     let mut parts = vec![
         COUNTERS,
+        RAY_TARGET,
+        RAY_RESULT,
+        KEPT_LOAD,
         EXP,
         SUM,
         plan.transmittance(),
@@ -109,9 +109,6 @@ pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -
         part!("composite.wgsl"),
     ];
     parts.extend(plan.sparsity());
-    if plan.needs.depth || plan.config.loss.distortion > 0.0 {
-        parts.extend([RAY, RAY_LOAD, part!("common/kept_distance.wgsl")]);
-    }
     plan.ray_stage(gpu, workspace, "composite", &parts)
 }
 
@@ -227,12 +224,12 @@ pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage
     }
     let taking = [&[STEP, ADAM], take.as_slice(), &[part!("adam_table.wgsl")]].concat();
     let bind = |label: &str, parts: &[Part]| workspace.bind(gpu, &plan.kernel(gpu, label, parts)?, &[]);
-    let range = bind("gradient range", &[COUNTERS, MAGNITUDE, part!("gradient_range.wgsl")])?;
+    let range = bind("gradient range", &[COUNTERS, RAY_RESULT, MAGNITUDE, part!("gradient_range.wgsl")])?;
     let sums = bind("weight sums", &[MAGNITUDE, part!("weight_sums.wgsl")])?;
     let scatter = bind("scatter", &scattering)?;
     let table = bind("adam table", &taking)?;
     let mlp = bind("adam mlp", &[STEP, ADAM, USABLE, part!("adam_mlp.wgsl")])?;
-    let finish = bind("finish", &[COUNTERS, USABLE, part!("finish.wgsl")])?;
+    let finish = bind("finish", &[COUNTERS, RAY_RESULT, USABLE, part!("finish.wgsl")])?;
     let sizes = workspace.get("dispatch");
     let scatter = match plan.accumulation {
         Accumulation::Ordered => Stage::fixed(scatter, plan.layout.levels.len() / 8, 1),

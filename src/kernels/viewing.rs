@@ -2,7 +2,7 @@
 
 use super::{
     CAMERA, COUNTERS, Camera, DENSITY, EXP, Needs, PROGRESS, Plan, Progress, RAY, RAY_STORE, SUM, Traits,
-    Workspace,
+    VIEW_RAY, Workspace,
 };
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
@@ -25,6 +25,9 @@ pub struct Rounds {
     /// Samples get colour wherever the weights since the last one sum to this, and stand for those in between.
     pub color_weight: f64,
 }
+
+/// Premultiplied colour without background, opacity, and mean depth in box units, as `view_composite.wgsl` writes them.
+pub type Pixel = [f32; 5];
 
 /// What does not show in 32 bits.
 pub const LEAST_WEIGHT: f64 = 1e-12;
@@ -51,15 +54,12 @@ impl Rounds {
 pub fn demands(plan: &Plan) -> Vec<Demand> {
     let (rays, band) = (plan.config.batch.rays, plan.rounds.band);
     vec![
-        Demand::storage::<Camera>("cameras", 1),
-        Demand::storage::<Progress>("progress", 1),
+        Demand::uniform::<Camera>("view_camera"),
+        Demand::uniform_storage::<Progress>("progress", 1),
         Demand::storage::<[u32; 2]>("view_slots", rays),
-        Demand::storage::<[u32; 2]>("ray_rounds", rays),
-        plan.tensor("view_pixels", Element::Word, rays),
-        plan.tensor("ray_states", Element::Vec4, rays),
-        plan.tensor("ray_colors", Element::Vec4, rays),
-        Demand::storage::<[f32; 4]>("view_color", band),
-        Demand::storage::<f32>("view_depth", band),
+        Demand::storage::<[u32; 3]>("view_rays", rays),
+        plan.tensor("ray_states", Element::Vec4, 2 * rays),
+        Demand::storage::<Pixel>("view_pixels", band),
     ]
 }
 
@@ -68,7 +68,7 @@ pub fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [COUNTERS, PROGRESS, RAY, RAY_STORE, CAMERA, part!("view_rays.wgsl")];
+    let parts = [COUNTERS, PROGRESS, RAY, RAY_STORE, VIEW_RAY, CAMERA, part!("view_rays.wgsl")];
     plan.ray_stage(gpu, workspace, "view rays", &parts)
 }
 
@@ -77,7 +77,8 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// # Errors
 /// When the kernel cannot be built.
 pub(super) fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [COUNTERS, RAY, CAMERA, EXP, DENSITY, plan.transmittance(), SUM, part!("view_select.wgsl")];
+    let parts =
+        [COUNTERS, RAY, VIEW_RAY, CAMERA, EXP, DENSITY, plan.transmittance(), SUM, part!("view_select.wgsl")];
     plan.ray_stage(gpu, workspace, "view select", &parts)
 }
 
@@ -86,5 +87,6 @@ pub(super) fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<St
 /// # Errors
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    plan.ray_stage(gpu, workspace, "view composite", &[COUNTERS, PROGRESS, part!("view_composite.wgsl")])
+    let parts = [COUNTERS, PROGRESS, VIEW_RAY, part!("view_composite.wgsl")];
+    plan.ray_stage(gpu, workspace, "view composite", &parts)
 }

@@ -9,7 +9,7 @@ use crate::dataset::Photo;
 use crate::gpu::banks::ROW;
 use crate::image::{Image, Pixels};
 use crate::kernels::photos::Units;
-use crate::kernels::{self, Needs, dimension, training};
+use crate::kernels::{self, Needs, RayTarget, dimension, training};
 use crate::reference::random::random_u32;
 use anyhow::Result;
 use glam::DVec2;
@@ -103,10 +103,8 @@ impl Photos {
     }
 
     fn compare(&self, tally: &mut Tally, case: &str, bench: &Workbench, count: usize) -> Result<()> {
-        let targets: Vec<[f32; 4]> = bench.read("targets", count)?;
-        let backgrounds: Vec<[f32; 4]> = bench.read("backgrounds", count)?;
+        let targets: Vec<RayTarget> = bench.read("ray_targets", count)?;
         let needs = &bench.plan.needs;
-        let depths: Vec<f32> = if needs.depth { bench.read("depth_targets", count)? } else { Vec::new() };
         let pixels: Vec<u32> = self.counting.iter().map(|counting| counting.len() as u32).collect();
         for (index, ray) in DeviceRay::read(bench, count)?.into_iter().enumerate() {
             let case = format!("{case}, ray {index}");
@@ -120,7 +118,9 @@ impl Photos {
                 if needs.depth {
                     let depth = f64::from(photo.depth[texel as usize] * UNITS.depth);
                     let distance = depth / camera.depth_of_unit(want.direction);
-                    tally.value(depths[index].into(), distance, 1.0 + distance, || format!("{case}, depth"));
+                    tally.value(targets[index].depth.into(), distance, 1.0 + distance, || {
+                        format!("{case}, depth")
+                    });
                 }
                 let origin = (want.origin - bounds().min()) / (2.0 * bounds().outer_half());
                 let size = 1.0 + origin.abs().max_element();
@@ -135,9 +135,8 @@ impl Photos {
             let [r, g, b, alpha] = target(&photo.image.pixels, texel as usize, needs.alpha);
             let over = |color: f64, channel: usize| color + (1.0 - alpha) * behind[channel];
             let target = [over(r, 0), over(g, 1), over(b, 2), alpha];
-            tally.each(&format!("{case}, target"), &targets[index], &target, |_| 1.0);
-            let want = [behind[0], behind[1], behind[2], 0.0];
-            tally.each(&format!("{case}, background"), &backgrounds[index], &want, |_| 1.0);
+            tally.each(&format!("{case}, target"), &targets[index].color, &target, |_| 1.0);
+            tally.each(&format!("{case}, background"), &targets[index].background, &behind, |_| 1.0);
         }
         Ok(())
     }

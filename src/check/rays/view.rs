@@ -219,7 +219,7 @@ impl<'a> View<'a> {
     /// The rays of `count` pixels from `first` on.
     fn draw(&self, first: usize, count: usize) -> Result<Vec<DeviceRay>> {
         let Bench { bench, stage } = self.bench;
-        bench.write("cameras", &[kernels::Camera::in_box(&self.camera, &bounds())]);
+        bench.write("view_camera", &[kernels::Camera::in_box(&self.camera, &bounds())]);
         begin_rays(bench, first..first + count);
         bench.run([stage])?;
         DeviceRay::read(bench, count)

@@ -158,8 +158,12 @@ impl Device {
                 None
             }
         };
-        let rendered: Vec<[f32; 4]> = bench.read("rendered", rays.len())?;
-        Ok(Outcome { rendered: rendered.into_iter().map(|ray| ray.map(f64::from)).collect(), kept, seconds })
+        let results = bench.results(rays.len())?;
+        Ok(Outcome {
+            rendered: results.iter().map(|ray| ray.rendered.map(f64::from)).collect(),
+            kept,
+            seconds,
+        })
     }
 }
 
