@@ -6,8 +6,8 @@ tensor<read_write> table: vec2<f32>;
 tensor<read_write> table_moments: vec4<f32>;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let index = 2u * (id.x + id.y * groups.x * 64u);
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let index = 2u * (id.x + id.y * GROUP_COLUMNS * 64u);
     if index >= TABLE_ENTRIES {
         return;
     }

@@ -7,7 +7,7 @@ tensor<write> occupancy_bits: u32;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let index = id.x;
+    let index = id.x + id.y * GROUP_COLUMNS * 64u;
     if index >= CELL_COUNT / 32u {
         return;
     }

@@ -30,7 +30,7 @@ pub(crate) struct Cli {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
-    /// The adapter to run on: an index of `nerf adapters`, or a part of a name [default: the first]
+    /// The adapter to run on: an index of `nerf adapters`, or parts of its name and backend [default: the first]
     #[arg(long, global = true, value_name = "INDEX|NAME")]
     pub(crate) adapter: Option<String>,
     /// Print one JSON object as the result, also when failing

@@ -38,7 +38,7 @@ use crate::gpu::pass::Stage;
 use crate::gpu::source::Source;
 use crate::gpu::tensor::Memory;
 use crate::model::{Layout, Level};
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 /// A file of WGSL under its name.
 pub type Part = (&'static str, &'static str);
@@ -138,6 +138,24 @@ impl Traits {
             subgroups_of_8: gpu.has_subgroups_of(8),
             memory: gpu.fast_memory(),
         }
+    }
+
+    /// Whether an adapter called `name` can sum gradients like this.
+    ///
+    /// # Errors
+    /// When it cannot: says why, and what to take instead.
+    pub fn check(&self, accumulation: Accumulation, name: &str) -> Result<()> {
+        ensure!(
+            accumulation != Accumulation::Ordered || self.is_cpu,
+            "ordered accumulation adds all gradients of a grid level in one thread: on a GPU like '{name}' a step would \
+             take seconds; leave it out, or ask for fixed, whose sum is the same in every run too"
+        );
+        ensure!(
+            accumulation != Accumulation::Float || self.float_atomics,
+            "float accumulation needs atomic addition of floats, and the adapter '{name}' does not have it; leave it \
+             out, or ask for exchange or fixed"
+        );
+        Ok(())
     }
 }
 
@@ -346,5 +364,25 @@ impl Plan {
                 [vec![part!("scatter_ordered.wgsl")], vec![part!("gradient/take_ordered.wgsl")]]
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn adapters_refuse_sums_that_do_not_suit_them() {
+        let modest = Traits { float_atomics: false, ..Traits::GPU };
+        let software = Traits { is_cpu: true, ..modest };
+        let refusal = |adapter: Traits, accumulation| {
+            adapter.check(accumulation, "it").err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        assert!(refusal(Traits::GPU, Accumulation::Ordered).contains("one thread"));
+        assert!(refusal(modest, Accumulation::Float).contains("exchange or fixed"));
+        for accumulation in [Accumulation::Exchange, Accumulation::Fixed] {
+            assert_eq!(refusal(modest, accumulation), "");
+        }
+        assert_eq!(refusal(Traits::GPU, Accumulation::Float) + &refusal(software, Accumulation::Ordered), "");
     }
 }

@@ -42,11 +42,12 @@ impl Memory {
         }
     }
 
-    /// Whether the adapter binds so many photos, and the host has the memory.
+    /// Whether the adapter runs the plan and binds so many photos, and the host has the memory.
     ///
     /// # Errors
     /// When it does not: says how much there is, and what to do.
     pub fn check(&self, gpu: &Gpu, plan: &Plan) -> Result<()> {
+        plan.check(gpu)?;
         let capacity = Capacity::of(&gpu.device.limits(), plan.memory).bytes();
         if self.photo_bytes > capacity {
             bail!(

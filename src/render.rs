@@ -68,7 +68,7 @@ impl Renderer {
         bounds: &Bounds,
         lenses: &BTreeSet<LensKind>,
     ) -> Result<Self> {
-        let mut plan = view_plan(plan);
+        let mut plan = plan.for_views();
         plan.needs.lenses.clone_from(lenses);
         let mut workspace = Workspace::default();
         for name in PARAMETERS {
@@ -98,7 +98,7 @@ impl Renderer {
     /// Bytes on the device that a renderer of `plan` takes besides the parameters.
     #[must_use]
     pub fn bytes(plan: &Plan) -> u64 {
-        view_plan(plan).viewing_demands().iter().map(Demand::bytes).sum()
+        plan.for_views().viewing_demands().iter().map(Demand::bytes).sum()
     }
 
     /// Renders what `camera` sees.
@@ -186,14 +186,4 @@ impl Renderer {
         workspace.write(gpu, "view_slots", &vec![[0u32, 1]; rays as usize]);
         gpu.run("first round of a view", [&self.refill], None);
     }
-}
-
-/// The plan of a renderer, whose budget does not depend on the training's: every sample may get colour.
-fn view_plan(plan: &Plan) -> Plan {
-    let mut plan = plan.clone();
-    let batch = &mut plan.config.batch;
-    batch.rays = plan.rounds.rays;
-    batch.samples = plan.rounds.samples.max(plan.rounds.rays);
-    batch.kept = batch.samples;
-    plan
 }

@@ -71,6 +71,7 @@ impl Trainer {
     /// When a photo is missing, or the adapter cannot hold the table or the batch or refuses a kernel.
     pub fn new(gpu: &Arc<Gpu>, mut plan: Plan, views: Views) -> Result<Self> {
         views.check()?;
+        plan.check(gpu)?;
         // Photos of which nothing can be drawn are never chosen.
         plan.needs.cameras = views.on_device.len();
         let hidden =

@@ -112,6 +112,9 @@ fn settings_that_do_not_fit_are_explained() {
     train(&["--adapter", "no such adapter"], &["--adapter", "no such adapter", "there are: 0: "]);
     train(&["--adapter", "99"], &["found '99'"]);
     train(&["--resume"], &["nothing to resume"]);
+    // 4 GiB of table: more than any adapter binds.
+    let huge = ["grid.log2_table=24", "grid.levels=32", "grid.finest=4096"].map(|set| ["--set", set]);
+    train(huge.as_flattened(), &["'table'", "use a smaller table (grid.log2_table)"]);
 }
 
 #[test]

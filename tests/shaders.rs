@@ -171,21 +171,18 @@ impl Linker {
         let storage = |kind: &BindingType| {
             matches!(kind, BindingType::Buffer { ty: wgpu::BufferBindingType::Storage { .. }, .. })
         };
-        let kinds: [(&str, fn(&BindingType) -> bool, u32); 3] = [
-            ("storage buffers", storage, limits.max_storage_buffers_per_shader_stage),
+        let storage_texture = |kind: &BindingType| matches!(kind, BindingType::StorageTexture { .. });
+        let texture = |kind: &BindingType| matches!(kind, BindingType::Texture { .. });
+        let counts = [
+            ("storage buffers", bindings(linked, storage), limits.max_storage_buffers_per_shader_stage),
             (
                 "storage textures",
-                |kind| matches!(kind, BindingType::StorageTexture { .. }),
+                bindings(linked, storage_texture),
                 limits.max_storage_textures_per_shader_stage,
             ),
-            (
-                "textures",
-                |kind| matches!(kind, BindingType::Texture { .. }),
-                limits.max_sampled_textures_per_shader_stage,
-            ),
+            ("textures", bindings(linked, texture), limits.max_sampled_textures_per_shader_stage),
         ];
-        for (name, is_counted, most) in kinds {
-            let count = bindings(linked, is_counted);
+        for (name, count, most) in counts {
             let parts: Vec<_> = chosen.iter().map(|&part| &self.parts[part].0).collect();
             assert!(count <= most as usize, "{} with {parts:?} has {count} {name}, of {most}", linked.label);
         }
@@ -199,6 +196,11 @@ impl Linker {
         let names: BTreeSet<&str> = linked.bindings.iter().map(|binding| binding.name.as_str()).collect();
         assert_eq!(names.len(), linked.bindings.len(), "{}: {names:?}", linked.label);
         self.check_bindings(linked, chosen);
+        let built_in = |argument: &naga::FunctionArgument| {
+            argument.binding == Some(naga::Binding::BuiltIn(naga::BuiltIn::NumWorkGroups))
+        };
+        let main = &entry[0].function;
+        assert!(!main.arguments.iter().any(built_in), "{} reads num_workgroups", linked.label);
         for layout in SHARED {
             let found =
                 linked.module.types.iter().find(|(_, kind)| kind.name.as_deref() == Some(layout.name));

@@ -5,7 +5,7 @@ use crate::config::Accumulation;
 use crate::gpu::Gpu;
 use crate::gpu::tensor::Memory;
 use crate::kernels::layer::Product;
-use crate::kernels::{Plan, training::accumulation_name};
+use crate::kernels::{Plan, Traits, training::accumulation_name};
 use anyhow::{Result, ensure};
 use std::sync::Arc;
 
@@ -35,12 +35,9 @@ impl Subject {
     /// When it cannot run one of them; the message says what it lacks.
     pub fn new(gpu: &Arc<Gpu>, forced: Forced) -> Result<Self> {
         let name = &gpu.info.name;
-        ensure!(
-            forced.accumulation != Some(Accumulation::Float)
-                || gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC),
-            "float accumulation needs atomic addition of floats, and the adapter '{name}' does not have it; leave it \
-             out, or ask for exchange or fixed"
-        );
+        if let Some(accumulation) = forced.accumulation {
+            Traits::of(gpu).check(accumulation, name)?;
+        }
         ensure!(
             forced.memory != Some(Memory::Textures) || gpu.has(crate::gpu::tensor::TEXTURE_FEATURES),
             "tensors in textures need textures that a kernel reads and writes, and the adapter '{name}' does not \

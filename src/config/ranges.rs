@@ -1,6 +1,7 @@
 //! What each setting may be.
 
 use super::{Accumulation, Config};
+use crate::gpu::pass::MOST_THREADS;
 use anyhow::{Result, bail};
 
 impl Config {
@@ -19,7 +20,8 @@ impl Config {
         }
         let whole = |key: &str, value: usize, low: usize, high: usize, step: usize| {
             if value < low || value > high || !value.is_multiple_of(step) {
-                bail!("{key} must be a multiple of {step} from {low} to {high}; found {value}");
+                let kind = if step == 1 { "whole number".to_owned() } else { format!("multiple of {step}") };
+                bail!("{key} must be a {kind} from {low} to {high}; found {value}");
             }
             Ok(())
         };
@@ -33,9 +35,9 @@ impl Config {
         whole("march.most_steps", march.most_steps, 32, 1 << 14, 32)?;
         whole("occupancy.cells", occupancy.cells as usize, 16, 256, 16)?;
         whole("occupancy.interval", occupancy.interval as usize, 1, 1 << 20, 1)?;
-        whole("batch.kept", batch.kept, march.most_steps, 1 << 22, 1)?;
-        whole("batch.samples", batch.samples, batch.kept.max(march.most_steps), 1 << 24, 1)?;
-        whole("batch.rays", batch.rays, 64, 1 << 22, 1)?;
+        whole("batch.kept", batch.kept, march.most_steps, MOST_THREADS, 1)?;
+        whole("batch.samples", batch.samples, batch.kept.max(march.most_steps), MOST_THREADS, 1)?;
+        whole("batch.rays", batch.rays, 64, MOST_THREADS, 1)?;
         whole("batch.first_rays", batch.first_rays as usize, 1, batch.rays, 1)?;
         let real = |key: &str, value: f64, low: f64, high: f64| {
             if !(low..=high).contains(&value) {

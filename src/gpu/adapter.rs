@@ -69,7 +69,8 @@ fn describe(index: usize, adapter: &wgpu::Adapter) -> Listing {
     }
 }
 
-/// Picks the adapter that `choice` names: an index, or a part of the name; without one, the first.
+/// Picks the adapter that `choice` names: an index, or words that are parts of its name or its backend's; without one,
+/// the first.
 ///
 /// # Errors
 /// When there is no adapter, or none that fits; the message lists what there is.
@@ -83,19 +84,43 @@ pub fn choose(choice: Option<&str>) -> Result<wgpu::Adapter> {
         );
     }
     let Some(choice) = choice else { return Ok(adapters.swap_remove(0)) };
-    let wanted = choice.to_lowercase();
+    let names: Vec<_> = list(&adapters).iter().map(|a| format!("{} over {}", a.name, a.backend)).collect();
     let position = match choice.parse::<usize>() {
         Ok(index) => (index < adapters.len()).then_some(index),
-        Err(_) => adapters.iter().position(|a| a.get_info().name.to_lowercase().contains(&wanted)),
+        Err(_) => names.iter().position(|name| is_named(name, choice)),
     };
     match position {
         Some(index) => Ok(adapters.swap_remove(index)),
         None => {
-            let names: Vec<_> = list(&adapters).iter().map(|a| format!("{}: {}", a.index, a.name)).collect();
+            let names: Vec<_> =
+                names.iter().enumerate().map(|(index, name)| format!("{index}: {name}")).collect();
             bail!(
-                "--adapter expects an index or a part of a name; found '{choice}', and there are: {}",
+                "--adapter expects an index, or parts of a name and backend; found '{choice}', and there are: {}",
                 names.join("; ")
             )
+        }
+    }
+}
+
+/// Whether all words of `choice` occur in an adapter's name, in any order and case.
+fn is_named(name: &str, choice: &str) -> bool {
+    let name = name.to_lowercase();
+    let mut words = choice.split_whitespace().peekable();
+    words.peek().is_some() && words.all(|word| name.contains(&word.to_lowercase()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_named;
+
+    #[test]
+    fn words_name_adapter_and_backend() {
+        let name = "NVIDIA GeForce RTX 3090 over Dx12";
+        for choice in ["nvidia", "dx12", "rtx 3090", "dx12 geforce", "DX12"] {
+            assert!(is_named(name, choice), "{choice}");
+        }
+        for choice in ["", " ", "vulkan", "vulkan nvidia", "rtx 3080"] {
+            assert!(!is_named(name, choice), "{choice}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Buffers with a name, and typed transfers to and from them.
 
 use super::Gpu;
-use anyhow::{Result, bail};
+use anyhow::{Result, ensure};
 use bytemuck::Pod;
 use wgpu::BufferUsages as Usage;
 
@@ -43,16 +43,20 @@ impl Gpu {
         Ok(buffer)
     }
 
-    pub(super) fn buffer(&self, name: &'static str, bytes: u64, usage: Usage) -> Result<Buffer> {
+    /// Whether the adapter binds a buffer of so many bytes.
+    pub(super) fn check_buffer(&self, name: &str, bytes: u64) -> Result<()> {
         let limits = self.device.limits();
         let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        if bytes > most {
-            bail!(
-                "the buffer '{name}' needs {bytes} bytes, and the adapter '{}' binds at most {most}; \
-                 use fewer or smaller images, a smaller grid (`--set grid.log2_table=…`) or a smaller batch",
-                self.info.name
-            );
-        }
+        ensure!(
+            bytes <= most,
+            "the buffer '{name}' needs {bytes} bytes, and the adapter '{}' binds at most {most}",
+            self.info.name
+        );
+        Ok(())
+    }
+
+    pub(super) fn buffer(&self, name: &'static str, bytes: u64, usage: Usage) -> Result<Buffer> {
+        self.check_buffer(name, bytes)?;
         let raw = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(name),
             size: bytes.max(16).next_multiple_of(16),

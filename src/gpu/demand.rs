@@ -73,6 +73,17 @@ impl Demand {
         (self.size * self.count) as u64
     }
 
+    /// Whether the adapter can bind as much.
+    ///
+    /// # Errors
+    /// When it cannot; the message tells both sizes.
+    pub fn check(&self, gpu: &Gpu) -> Result<()> {
+        match self.kind {
+            Kind::Tensor(_, Memory::Textures) => gpu.check_texture(self.name, self.count),
+            _ => gpu.check_buffer(self.name, self.bytes()),
+        }
+    }
+
     /// Allocates it, zeroed.
     ///
     /// # Errors

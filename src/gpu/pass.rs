@@ -23,7 +23,21 @@ pub struct Stage {
     pub size: Size,
 }
 
+/// Workgroups along x of a dispatch that has several along y; kernels know it as GROUP_COLUMNS. Adapters take 65,535 at
+/// least.
+pub const GROUP_COLUMNS: usize = 1 << 15;
+
+/// Threads of a dispatch along x, in workgroups of 64: what every adapter takes.
+pub const MOST_THREADS: usize = 65_535 * 64;
+
 impl Stage {
+    /// A stage of so many workgroups, which need not fit along one axis.
+    #[must_use]
+    pub fn wide(bound: Bound, groups: usize) -> Self {
+        let columns = groups.min(GROUP_COLUMNS);
+        Self::fixed(bound, columns, groups.div_ceil(columns.max(1)))
+    }
+
     /// A stage of fixed size.
     #[must_use]
     pub fn fixed(bound: Bound, x: usize, y: usize) -> Self {

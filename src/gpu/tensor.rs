@@ -8,7 +8,7 @@
 //! and calls `name_load(index)` and `name_store(index, value)`. It is the one extension of the linker.
 
 use super::Gpu;
-use anyhow::{Result, bail};
+use anyhow::{Result, ensure};
 use bytemuck::Pod;
 
 /// Where the tensors of a kernel live.
@@ -187,16 +187,21 @@ impl Gpu {
         Ok(Tensor { name, element, count, place })
     }
 
+    /// Whether the adapter has textures for so many elements.
+    pub(super) fn check_texture(&self, name: &str, count: usize) -> Result<()> {
+        let (rows, most) = (texture_rows(count), self.device.limits().max_texture_dimension_2d as usize);
+        ensure!(
+            rows <= most,
+            "the tensor '{name}' needs {rows} rows of {WIDTH} texels, and the adapter '{}' has textures of at most \
+             {most} rows",
+            self.info.name
+        );
+        Ok(())
+    }
+
     fn texture(&self, name: &'static str, element: Element, count: usize) -> Result<Place> {
-        let rows = count.div_ceil(WIDTH).max(1);
-        let most = self.device.limits().max_texture_dimension_2d as usize;
-        if rows > most {
-            bail!(
-                "the tensor '{name}' needs {rows} rows of {WIDTH} texels, and the adapter '{}' has textures of at \
-                 most {most} rows; use a smaller grid (`--set grid.log2_table=…`) or batch (`--set batch.samples=…`)",
-                self.info.name
-            );
-        }
+        self.check_texture(name, count)?;
+        let rows = texture_rows(count);
         use wgpu::TextureUsages as Usage;
         let texture = self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(name),
@@ -260,6 +265,10 @@ impl Gpu {
         self.submit(encoder);
         self.read(&staging, 0, count)
     }
+}
+
+fn texture_rows(count: usize) -> usize {
+    count.div_ceil(WIDTH).max(1)
 }
 
 fn row_layout(element: Element) -> wgpu::TexelCopyBufferLayout {

@@ -2,6 +2,7 @@
 
 use super::{Plan, dispatch};
 use crate::config::Transmittance;
+use crate::gpu::pass::GROUP_COLUMNS;
 use crate::gpu::source::Source;
 use crate::model::DENSITY_OUTPUTS;
 use std::fmt::Display;
@@ -55,6 +56,7 @@ impl Plan {
             ("DENSITY_QUADS", DENSITY_OUTPUTS / 4),
             ("MLP_QUADS", layout.quads),
             ("CHUNKS", self.chunks),
+            ("GROUP_COLUMNS", GROUP_COLUMNS),
             ("SAMPLES_PER_THREAD", self.product.rows),
             ("CELLS", config.occupancy.cells as usize),
             ("CELL_COUNT", self.cell_count()),

@@ -48,7 +48,7 @@ impl Update {
             chunk,
             bits: vec![
                 Stage::fixed(workspace.bind(gpu, &mean, &[])?, 1, 1),
-                Stage::fixed(workspace.bind(gpu, &bits, &[])?, words.div_ceil(64), 1),
+                Stage::wide(workspace.bind(gpu, &bits, &[])?, words.div_ceil(64)),
             ],
             level_pairs: plan.layout.levels.len() / 2,
             rows_per_thread: plan.product.rows,

@@ -235,13 +235,11 @@ pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage
         Accumulation::Ordered => Stage::fixed(scatter, plan.layout.levels.len() / 8, 1),
         _ => Stage::indirect(scatter, sizes, dispatch::KEPT),
     };
-    let groups = plan.layout.entries.div_ceil(128);
-    let columns = groups.min(1 << 15);
     Ok(vec![
         Stage::indirect(range, sizes, dispatch::KEPT),
         Stage::fixed(sums, plan.layout.quads.div_ceil(8), 1),
         scatter,
-        Stage::fixed(table, columns, groups.div_ceil(columns)),
+        Stage::wide(table, plan.layout.entries.div_ceil(128)),
         Stage::fixed(mlp, plan.layout.quads.div_ceil(8), 1),
         Stage::fixed(finish, 1, 1),
     ])
