@@ -56,6 +56,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     };
     let setup = Setup::new(&wishes, &dataset, &gpu, folder.checkpoint.take())?;
     setup.describe(&gpu, session.remarks);
+    photos::check_memory(&setup, &dataset, &gpu, session.remarks)?;
     writable_folder(&args.out)?;
     let clock = Instant::now();
     let views = photos::load(&setup, &dataset, &gpu, session.remarks)?;

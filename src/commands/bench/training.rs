@@ -130,6 +130,7 @@ impl Course<'_> {
     /// Trains and measures once.
     fn run(&self, entry: &Entry, session: &Session<'_>) -> Result<Run> {
         let setup = &entry.setup;
+        photos::check_memory(setup, self.dataset, &self.gpu, session.remarks)?;
         let clock = Instant::now();
         let views = photos::load(setup, self.dataset, &self.gpu, session.remarks)?;
         let load_seconds = clock.elapsed().as_secs_f64();

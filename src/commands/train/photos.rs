@@ -11,17 +11,26 @@ use nerf::views::Views;
 use nerf::words::{bytes, few};
 use std::sync::Arc;
 
-/// Decodes the training photos, a few at a time, and puts them on the device, unless there is no room for them.
+/// Whether there is room for the training and its photos, on the host and on the device.
+pub(in crate::commands) fn check_memory(
+    setup: &Setup,
+    dataset: &Dataset,
+    gpu: &Gpu,
+    remarks: Remarks,
+) -> Result<()> {
+    let memory = Memory::of_training(&setup.plan, &setup.cameras, dataset.stream_bytes(&setup.train));
+    let [host, device, photos] = [memory.host_bytes, memory.device_bytes, memory.photo_bytes].map(bytes);
+    remarks.say(&format!("memory: {host} on the host, {device} on the device, {photos} of it photos"));
+    memory.check(gpu, &setup.plan)
+}
+
+/// Decodes the training photos, a few at a time, and puts them on the device.
 pub(in crate::commands) fn load(
     setup: &Setup,
     dataset: &Dataset,
     gpu: &Arc<Gpu>,
     remarks: Remarks,
 ) -> Result<Views> {
-    let memory = Memory::of_training(&setup.plan, &setup.cameras, dataset.stream_bytes(&setup.train));
-    let [host, device, photos] = [memory.host_bytes, memory.device_bytes, memory.photo_bytes].map(bytes);
-    remarks.say(&format!("memory: {host} on the host, {device} on the device, {photos} of it photos"));
-    memory.check(gpu, &setup.plan)?;
     let mut views = Views::new(gpu, &setup.plan, &setup.cameras, &setup.about.bounds)?;
     let progress = Progress::new(remarks, "loading");
     let mut ignored = Vec::new();
