@@ -40,10 +40,18 @@ impl Gpu {
     /// # Errors
     /// When the driver refuses to create the device.
     pub fn open(adapter: &wgpu::Adapter) -> Result<Self> {
+        Self::open_with(adapter, wgpu::Features::empty())
+    }
+
+    /// As [`Gpu::open`], with those of `further` features that it has.
+    ///
+    /// # Errors
+    /// As [`Gpu::open`].
+    pub fn open_with(adapter: &wgpu::Adapter, further: wgpu::Features) -> Result<Self> {
         let info = adapter.get_info();
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("nerf"),
-            required_features: adapter.features() & WANTED_FEATURES,
+            required_features: adapter.features() & (WANTED_FEATURES | further),
             required_limits: adapter.limits(),
             memory_hints: wgpu::MemoryHints::Performance,
             ..Default::default()

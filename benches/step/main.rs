@@ -6,9 +6,12 @@
 //! ```
 //!
 //! Three measurements: the start, in a process of its own with the driver's cache off; the throughput, as
-//! `nerf train` trains; and the time of each stage, with a wait after each step.
+//! `nerf train` trains; and the time of each stage, with a wait after each step, its arithmetic and traffic, and their
+//! share of what the adapter can do (`cargo bench --bench ceilings`).
 
 mod report;
+mod stages;
+mod work;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Parser, ValueEnum};
@@ -26,7 +29,7 @@ use nerf::views::Views;
 use report::{result, table};
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use stages::{StageTime, stage_times};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -61,12 +64,15 @@ struct Args {
     /// Seconds of training before, so that the occupancy grid has found the scene
     #[arg(long, default_value = "30")]
     warm: f64,
-    /// The adapter: an index of `nerf adapters`, or a part of a name [default: the first]
+    /// The adapter: an index of `nerf adapters`, or parts of its name and backend [default: the first]
     #[arg(long)]
     adapter: Option<String>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    /// What `cargo bench --bench ceilings` wrote, to compare the stages with
+    #[arg(long, value_name = "FILE")]
+    ceilings: Option<PathBuf>,
     /// Also write that object to a file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -136,15 +142,6 @@ struct Throughput {
     samples_per_second_of_two_cores: Option<f64>,
 }
 
-/// Time of a stage in some steps.
-#[derive(Debug, Serialize)]
-struct StageTime {
-    stage: String,
-    ms_per_step: f64,
-    ns_per_sample: f64,
-    share: f64,
-}
-
 /// A training ready for its first step.
 struct Run {
     gpu: Arc<Gpu>,
@@ -164,6 +161,13 @@ fn main() -> Result<()> {
     if args.only_start {
         return only_start(&args, &dataset, began);
     }
+    let ceilings = match &args.ceilings {
+        Some(file) => {
+            let text = std::fs::read(file).with_context(|| format!("reading {}", file.display()))?;
+            serde_json::from_slice(&text).with_context(|| format!("reading {}", file.display()))?
+        }
+        None => Value::Null,
+    };
     let start = if args.no_start { None } else { Some(cold_start(&args, &dataset)?) };
     let mut run = Run::new(&args, &dataset)?;
     say("warming up");
@@ -172,7 +176,7 @@ fn main() -> Result<()> {
     let throughput = run.train(args.seconds)?;
     ensure!(throughput.samples > 0, "the rays meet nothing: the field is empty");
     say("timing the stages");
-    let stages = run.stages()?;
+    let stages = run.stages(&ceilings)?;
     let result = result(&args, &run, start.as_ref(), &throughput, &stages);
     if let Some(file) = &args.out {
         std::fs::write(file, format!("{result}\n")).with_context(|| format!("writing {}", file.display()))?;
@@ -284,7 +288,7 @@ impl Run {
     }
 
     /// The time of each stage; empty where the adapter has no timestamps.
-    fn stages(&mut self) -> Result<Vec<StageTime>> {
+    fn stages(&mut self, ceilings: &Value) -> Result<Vec<StageTime>> {
         let Ok(mut timer) = Timer::new(&self.gpu) else { return Ok(Vec::new()) };
         let clock = Instant::now();
         for _ in 0..TIMED_STEPS {
@@ -292,7 +296,7 @@ impl Run {
         }
         let stats = self.trainer.report()?;
         let seconds = clock.elapsed().as_secs_f64();
-        Ok(stage_times(timer.totals(), seconds, stats))
+        stage_times(timer.totals(), seconds, stats, self.trainer.plan(), ceilings)
     }
 }
 
@@ -322,21 +326,6 @@ fn trainer(gpu: &Arc<Gpu>, config: Config, dataset: &Dataset, images: &[Image]) 
     let mut views = Views::new(gpu, &plan, &cameras, &dataset.bounds)?;
     images.iter().try_for_each(|image| views.add(&image.clone().into()))?;
     Trainer::new(gpu, plan, views)
-}
-
-/// Slowest first; what no stage accounts for comes last.
-fn stage_times(totals: &BTreeMap<String, f64>, all_seconds: f64, stats: StepStats) -> Vec<StageTime> {
-    let mut stages: Vec<_> = totals.iter().map(|(stage, &seconds)| (stage.clone(), seconds)).collect();
-    stages.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let staged: f64 = totals.values().sum();
-    stages.push(("occupancy updates, submission, waiting".into(), (all_seconds - staged).max(0.0)));
-    let time = |(stage, seconds): (String, f64)| StageTime {
-        stage,
-        ms_per_step: 1e3 * seconds / f64::from(stats.steps.max(1)),
-        ns_per_sample: 1e9 * seconds / stats.samples.max(1) as f64,
-        share: seconds / all_seconds,
-    };
-    stages.into_iter().map(time).collect()
 }
 
 /// User and system time of this process, all threads together. Linux counts it in hundredths of a second.

@@ -1,6 +1,6 @@
 //! What was measured, as JSON and as text.
 
-use super::{Args, Run, StageTime, Start, Throughput};
+use super::{Args, Run, StageTime, Start, Throughput, stages};
 use clap::ValueEnum;
 use serde_json::{Value, json};
 
@@ -71,11 +71,7 @@ pub(crate) fn table(
             .map(|rate| format!("samples/s  {rate:.0} kept, by CPU time on two cores")),
     );
     if !stages.is_empty() {
-        lines.push(format!("\n{:40} {:>9} {:>10} {:>7}", "stage", "ms/step", "ns/sample", "share"));
+        lines.extend(stages::table(stages));
     }
-    lines.extend(stages.iter().map(|s| {
-        let share = 100.0 * s.share;
-        format!("{:40} {:9.2} {:10.1} {share:6.1}%", s.stage, s.ms_per_step, s.ns_per_sample)
-    }));
     lines.join("\n")
 }

@@ -18,8 +18,30 @@ pub struct Listing {
     pub driver: String,
     /// The largest buffer binding, in bytes.
     pub max_binding_bytes: u64,
-    /// Whether f32 atomics and timestamps are there.
+    /// Which of f32 atomics, 64-bit integer atomics, half floats, subgroups, cooperative matrices and timestamps are
+    /// there.
     pub features: Vec<&'static str>,
+    /// Fewest and most threads of a subgroup.
+    pub subgroup_sizes: [u32; 2],
+    /// The matrix products that it has units for.
+    pub cooperative_matrices: Vec<MatrixSize>,
+    /// All that wgpu tells of its limits.
+    pub limits: wgpu::Limits,
+}
+
+/// A product of matrices `[m, k]` and `[k, n]` that is added to one of `[m, n]`.
+#[derive(Clone, Debug, Serialize)]
+pub struct MatrixSize {
+    /// Rows of the result.
+    pub m: u32,
+    /// Columns of the result.
+    pub n: u32,
+    /// Terms of a sum.
+    pub k: u32,
+    /// Type of the factors.
+    pub factors: wgpu::CooperativeScalarType,
+    /// Type of the sums.
+    pub sums: wgpu::CooperativeScalarType,
 }
 
 /// All adapters of this machine, GPUs first, in a fixed order.
@@ -52,8 +74,19 @@ fn describe(index: usize, adapter: &wgpu::Adapter) -> Listing {
     let info = adapter.get_info();
     let features = [
         ("float32-atomics", wgpu::Features::SHADER_FLOAT32_ATOMIC),
+        ("int64-atomics", wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS),
+        ("half-floats", wgpu::Features::SHADER_F16),
+        ("subgroups", wgpu::Features::SUBGROUP),
+        ("cooperative-matrices", wgpu::Features::EXPERIMENTAL_COOPERATIVE_MATRIX),
         ("timestamps", wgpu::Features::TIMESTAMP_QUERY),
     ];
+    let matrices = adapter.cooperative_matrix_properties().into_iter().map(|size| MatrixSize {
+        m: size.m_size,
+        n: size.n_size,
+        k: size.k_size,
+        factors: size.ab_type,
+        sums: size.cr_type,
+    });
     Listing {
         index,
         kind: format!("{:?}", info.device_type),
@@ -65,6 +98,9 @@ fn describe(index: usize, adapter: &wgpu::Adapter) -> Listing {
             .filter(|(_, feature)| adapter.features().contains(*feature))
             .map(|(name, _)| *name)
             .collect(),
+        subgroup_sizes: [info.subgroup_min_size, info.subgroup_max_size],
+        cooperative_matrices: matrices.collect(),
+        limits: adapter.limits(),
         name: info.name,
     }
 }
