@@ -16,6 +16,7 @@ use std::io::Write;
 use std::panic::resume_unwind;
 use std::sync::mpsc;
 use std::thread;
+use std::time::Instant;
 
 /// A camera to render, and where it comes from.
 struct Job {
@@ -45,7 +46,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     let depth_range = depth_range(&field.about.bounds, &jobs);
     let writer = Writer { args, color_space: field.color_space(), depth_range };
     let progress = Progress::new(session.remarks, "rendering");
-    let frames = render_and_write(&mut renderer, &jobs, &writer, &progress)?;
+    let (frames, seconds) = render_and_write(&mut renderer, &jobs, &writer, &progress)?;
     drop(progress);
     let mut listing = json!({ "checkpoint": field.path.display().to_string(), "step": field.about.step });
     if args.depth {
@@ -58,36 +59,41 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
         Ok(file.write_all(b"\n")?)
     })?;
     let out = args.out.display().to_string();
-    session.print(&json!({ "out": out, "frames": jobs.len() }), &format!("{} frames in {out}", jobs.len()))
+    let result = json!({ "out": out, "frames": jobs.len(), "seconds": seconds });
+    session.print(&result, &format!("{} frames in {out}", jobs.len()))
 }
 
-/// Renders the jobs in order and describes their files. A thread writes those of one view while the next one renders.
+/// Renders the jobs in order, describes their files, and tells the seconds that each took to render. A thread writes those
+/// of one view while the next one renders.
 fn render_and_write(
     renderer: &mut Renderer,
     jobs: &[Job],
     writer: &Writer<'_>,
     progress: &Progress,
-) -> Result<Vec<Value>> {
+) -> Result<(Vec<Value>, Vec<f64>)> {
     thread::scope(|scope| {
         // Without room in between: the next view waits until the last one is written.
         let (sender, views) = mpsc::sync_channel::<(&Job, View)>(0);
         let writing = scope.spawn(move || views.iter().map(|(job, view)| writer.write(job, &view)).collect());
-        let mut render = || -> Result<()> {
+        let mut render = || -> Result<Vec<f64>> {
+            let mut seconds = Vec::with_capacity(jobs.len());
             for (number, job) in jobs.iter().enumerate() {
+                let clock = Instant::now();
                 let view = renderer.render(&job.camera)?;
+                seconds.push(clock.elapsed().as_secs_f64());
                 // Nobody receives it where writing failed, which is reported below.
                 if sender.send((job, view)).is_err() {
                     break;
                 }
                 progress.count(number + 1, jobs.len(), "frames");
             }
-            Ok(())
+            Ok(seconds)
         };
         let rendered = render();
         drop(sender);
         let written: Result<Vec<Value>> = writing.join().unwrap_or_else(|panic| resume_unwind(panic));
         let frames = written?;
-        rendered.map(|()| frames)
+        rendered.map(|seconds| (frames, seconds))
     })
 }
 
