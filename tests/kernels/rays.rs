@@ -51,7 +51,7 @@ fn rays_along_the_axes() -> Result<()> {
         ([-0.001, 0.5, 3.0], [0.0, 0.0, 1.0], None),
     ] {
         let camera = pixel_camera(DVec3::from_array(origin), -DVec3::from_array(back));
-        bench.write("cameras", &[camera]);
+        bench.write("view_camera", &[camera]);
         begin_rays(&bench, 0..1);
         bench.run([&stage])?;
         let ray = &DeviceRay::read(&bench, 1)?[0];
