@@ -11,6 +11,7 @@
 #   SECONDS_ALL   of the whole call [default: 540]
 #   REHEARSAL     1: tiny budgets, to try this script on a CPU
 #   FAIL, HANG    names of parts that fail, or hang, to try what happens then
+#   LIMIT         seconds of any part at most, to try that sooner
 set -uo pipefail
 
 # Names of the parts, seconds that they are given at most, and seconds without which they are not begun. Sweeps and
@@ -46,7 +47,7 @@ train_scene_60s      90  66
 '
 
 if [ $# -lt 1 ]; then
-    sed -n '6,14s/^# //p' "$0" >&2
+    sed -n '6,15s/^# //p' "$0" >&2
     exit 2
 fi
 here=$(cd "$(dirname "$0")" && pwd)
@@ -209,8 +210,8 @@ say() {
 
 # Puts all that is known into RESULTS; the archive is there whole at any time.
 archive() {
-    cp "$out/summary.txt" "$results/summary.txt"
     tar -C "$out" -czf "$results/.results.tar.gz" . && mv "$results/.results.tar.gz" "$results/results.tar.gz"
+    cp "$out/summary.txt" "$results/summary.txt"
     # What brings it back may refuse larger files.
     if [ "$(stat -c %s "$results/results.tar.gz")" -gt $((15 << 20)) ] && [ -d "$out/views" ]; then
         rm -r "$out/views"
@@ -264,10 +265,12 @@ wrong= failed=
     printf 'date %s\nrehearsal %s\nseconds %s\n' "$(date -u +%F)" "${REHEARSAL:-0}" "$most"
 } >"$out/meta.txt"
 : >"$out/summary.txt"
+awk 'NF { print $1 }' <<<"$parts" >"$out/planned.txt"
 printf 'part\tstatus\tcode\tseconds\n' >"$out/parts.tsv"
 find_driver
 while read -r name limit least; do
     [ -n "$name" ] || continue
+    limit=$((limit < ${LIMIT:-600} ? limit : ${LIMIT:-600}))
     # The last seconds are for the archive.
     left=$((most - 5 - (SECONDS - begin)))
     if [ "$left" -lt "$(awk "BEGIN { print int($least * $time_factor) }")" ]; then

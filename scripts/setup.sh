@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes sure that nerf can be built and run here: a Rust toolchain, a C compiler to link with, and a Vulkan
-# driver. Says what it installs; says nothing where nothing is missing.
+# Makes sure that nerf can be built, run and tested here: a Rust toolchain, a C compiler to link with, a Vulkan driver, and
+# Python for the scripts that tests run. Says what it installs; says nothing where nothing is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -41,6 +41,10 @@ fi
 if ! command -v cc >/dev/null; then
     is_debian || fail "no C compiler (cc) was found, and Rust links with it: install gcc or clang"
     install "a C compiler" gcc libc6-dev
+fi
+if ! command -v python3 >/dev/null; then
+    is_debian || fail "no python3 was found: install Python 3.8 or newer"
+    install "Python" python3-minimal
 fi
 # macOS has Metal and Windows has DX12.
 if [ "$(uname -s)" = Linux ] && ! has_vulkan; then

@@ -1,0 +1,7 @@
+#!/usr/bin/env bash
+# Stands in for the kernel tests in the tests of scripts/gpu.sh. WRONG=kernels lets one fail.
+if [ "${WRONG:-}" = kernels ]; then
+    printf 'test grid::one_feature_by_hand ... FAILED\ntest result: FAILED. 36 passed; 1 failed; 0 ignored\n'
+    exit 101
+fi
+printf 'test result: ok. 37 passed; 0 failed; 0 ignored\n'

@@ -1,0 +1,180 @@
+//! `scripts/gpu.sh` and `scripts/gpu_results.py` from end to end, with programs that stand in for nerf and its benchmarks:
+//! parts that fail, hang or find wrong kernels, and a call that is killed.
+#![cfg(unix)]
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const PARTS: usize = 27;
+
+/// A folder of this test run that holds an unpacked bundle.
+struct Machine {
+    folder: PathBuf,
+}
+
+impl Machine {
+    fn new(name: &str) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("gpu_script").join(name);
+        let _ = fs::remove_dir_all(&folder);
+        let bin = folder.join("bundle/bin");
+        fs::create_dir_all(&bin).expect("writable");
+        for (stand_in, program) in
+            [("nerf", "nerf"), ("bench", "ceilings"), ("bench", "step"), ("kernels", "kernels")]
+        {
+            copy(&format!("tests/gpu_script/{stand_in}.sh"), &bin.join(program));
+        }
+        copy("scripts/gpu.sh", &folder.join("bundle/gpu.sh"));
+        for dataset in ["lego_200", "fox_270x480"] {
+            fs::create_dir_all(folder.join("bundle/data").join(dataset)).expect("writable");
+        }
+        Self { folder }
+    }
+
+    fn script(&self, variables: &[(&str, &str)]) -> std::process::Command {
+        let mut command = std::process::Command::new(self.folder.join("bundle/gpu.sh"));
+        command.arg(self.folder.join("results")).current_dir("/").envs(variables.iter().copied());
+        command
+    }
+
+    /// Runs the script, and returns its exit code.
+    fn run(&self, variables: &[(&str, &str)]) -> Option<i32> {
+        self.script(variables).output().expect("bash").status.code()
+    }
+
+    /// What the archive becomes: the merged results, the report and the README.
+    fn results(&self) -> (Value, String, String) {
+        let readme = self.folder.join("README.md");
+        let text = "before\n<!-- written by scripts/gpu_results.py -->\nold\n<!-- end of what scripts/gpu_results.py \
+                    writes -->\nafter\n";
+        fs::write(&readme, text).expect("writable");
+        let pages = self.folder.join("pages");
+        Command::new("python3")
+            .arg(Path::new(ROOT).join("scripts/gpu_results.py"))
+            .args([&self.folder.join("results/results.tar.gz"), &pages, &readme])
+            .assert()
+            .success();
+        let page = fs::read_dir(&pages).expect("pages").next().expect("a folder").expect("an entry").path();
+        assert!(page.to_string_lossy().ends_with("_test-gpu"), "{}", page.display());
+        let read = |path: &Path| fs::read_to_string(path).expect("text");
+        let merged = serde_json::from_str(&read(&page.join("gpu.json"))).expect("JSON");
+        (merged, read(&page.join("report.md")), read(&readme))
+    }
+}
+
+fn copy(from: &str, to: &Path) {
+    fs::copy(Path::new(ROOT).join(from), to).expect("copied");
+    fs::set_permissions(to, fs::Permissions::from_mode(0o755)).expect("executable");
+}
+
+/// How many parts ended so.
+fn count(merged: &Value, status: &str) -> usize {
+    let parts = merged["parts"].as_object().expect("parts");
+    parts.values().filter(|part| part["status"] == status).count()
+}
+
+#[test]
+fn a_whole_call_is_told_in_full() {
+    let machine = Machine::new("whole");
+    assert_eq!(machine.run(&[]), Some(0));
+    let (merged, report, readme) = machine.results();
+    assert_eq!(
+        (count(&merged, "done"), merged["parts"].as_object().map(|parts| parts.len())),
+        (PARTS, Some(PARTS))
+    );
+    for line in [
+        "# Test GPU (rev 2) over Vulkan",
+        "- Cooperative matrices: 16x16x16 F16 into F32",
+        "- `nerf check`, exchange: right",
+        "- `--deterministic` twice: the same, bit for bit",
+        "| multiply-adds, TFLOP/s | 50.000 |",
+        "| atomics at random addresses, long integer, G/s | - |",
+        "5.00 ms a step, 50.0 million kept samples a second",
+        "| encode | 0.500 | 10.0 | 2000.0 | 200.0 | 160.0 | - | 42 % gathers |",
+        "| kept 16 | 5.00 | 50.00 | 1 |",
+        "| lego 1.5s | 12.0 | 100 | 34.57 | 0.9876 | 25 | 0 |",
+        "median: 30.0 ms",
+    ] {
+        assert!(report.contains(line), "no '{line}' in\n{report}");
+    }
+    assert!(!report.contains("missing"), "{report}");
+    assert!(
+        readme.starts_with("before\n") && readme.ends_with("after\n") && !readme.contains("old"),
+        "{readme}"
+    );
+    let all = "34.57 / 34.57 / 34.57 / 34.57";
+    assert!(
+        readme.contains(&format!("| right | the same, bit for bit | 5.00 | {all} | {all} | 34.57 | 30.0 |")),
+        "{readme}"
+    );
+    let names: Vec<_> = fs::read_dir(machine.folder.join("results")).expect("results").collect();
+    assert_eq!(names.len(), 2, "the archive and the summary, nothing else");
+}
+
+#[test]
+fn parts_that_fail_or_hang_do_not_stop_the_rest() {
+    let machine = Machine::new("failing");
+    let begin = Instant::now();
+    let variables = [("FAIL", "step"), ("HANG", "train_lego_12s"), ("LIMIT", "2")];
+    assert_eq!(machine.run(&variables), Some(2));
+    assert!(begin.elapsed() < Duration::from_secs(60), "a part that hangs is ended");
+    let (merged, report, readme) = machine.results();
+    assert_eq!(
+        (count(&merged, "done"), count(&merged, "failed"), count(&merged, "timeout")),
+        (PARTS - 2, 1, 1)
+    );
+    assert!(
+        report.contains("| lego 12s | missing | missing |") && report.contains("| step | failed |"),
+        "{report}"
+    );
+    assert!(readme.contains("| missing | 34.57 / 34.57 / missing / 34.57 |"), "{readme}");
+}
+
+#[test]
+fn wrong_kernels_are_in_the_exit_code() {
+    for (wrong, told) in [
+        ("own", "own path: wrong: hash grid: features"),
+        ("fixed", "fixed: wrong: hash grid: features"),
+        ("kernels", "36 passed, 1 failed grid::one_feature_by_hand"),
+    ] {
+        let machine = Machine::new(&format!("wrong_{wrong}"));
+        assert_eq!(machine.run(&[("WRONG", wrong), ("FAIL", "ceilings")]), Some(1), "{wrong}");
+        let (merged, report, _) = machine.results();
+        assert_eq!((count(&merged, "wrong"), count(&merged, "failed")), (1, 1), "{wrong}");
+        assert!(report.contains(told), "{report}");
+    }
+}
+
+#[test]
+fn parts_without_time_are_left_out_and_told() {
+    let machine = Machine::new("short");
+    assert_eq!(machine.run(&[("SECONDS_ALL", "30")]), Some(2));
+    let (merged, report, _) = machine.results();
+    assert!(count(&merged, "skipped") >= 2 && count(&merged, "done") > 10, "{report}");
+    assert!(report.contains("| train_lego_60s | skipped |"), "{report}");
+}
+
+#[test]
+fn a_killed_call_leaves_what_was_known() {
+    let machine = Machine::new("killed");
+    let mut script = machine.script(&[("HANG", "render")]);
+    let mut call = script.process_group(0).stderr(Stdio::null()).spawn().expect("bash");
+    let summary = machine.folder.join("results/summary.txt");
+    let begin = Instant::now();
+    while !fs::read_to_string(&summary).is_ok_and(|text| text.contains("train_lego_60s")) {
+        assert!(begin.elapsed() < Duration::from_secs(60), "the script did not get that far");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    Command::new("kill").args(["-KILL", "--", &format!("-{}", call.id())]).assert().success();
+    assert_eq!(call.wait().expect("ended").signal(), Some(9));
+    let (merged, report, readme) = machine.results();
+    assert_eq!((count(&merged, "done"), count(&merged, "missing")), (11, PARTS - 11));
+    assert!(report.contains("| render | missing | - |"), "{report}");
+    assert!(readme.contains("missing / missing / missing / missing | missing | missing |"), "{readme}");
+}
