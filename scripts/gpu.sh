@@ -257,16 +257,25 @@ digest() {
     done | tr -d '"' | awk -F: '{ printf "%s%s %.4g", sep, $1, $2; sep = ", " }'
 }
 
+# Why a part did not end well, in one line: nerf tells it in JSON, others on stderr.
+reason() {
+    {
+        grep -o '"error":.*' "$out/$1.json" 2>/dev/null | sed 's/^"error":"//; s/"}*$//; s/^error: //'
+        grep -i error "$out/$1.err" 2>/dev/null
+        tail -n 1 "$out/$1.err" 2>/dev/null
+    } | sed 's/\\n.*//' | tr '\t' ' ' | grep -m 1 .
+}
+
 begin=$SECONDS
 most=${SECONDS_ALL:-540}
-wrong= failed=
+wrong='' failed=''
 {
     cat BUNDLE 2>/dev/null
     printf 'date %s\nrehearsal %s\nseconds %s\n' "$(date -u +%F)" "${REHEARSAL:-0}" "$most"
 } >"$out/meta.txt"
 : >"$out/summary.txt"
 awk 'NF { print $1 }' <<<"$parts" >"$out/planned.txt"
-printf 'part\tstatus\tcode\tseconds\n' >"$out/parts.tsv"
+printf 'part\tstatus\tcode\tseconds\treason\n' >"$out/parts.tsv"
 find_driver
 while read -r name limit least; do
     [ -n "$name" ] || continue
@@ -281,20 +290,22 @@ while read -r name limit least; do
             </dev/null >"$out/$name.out" 2>"$out/$name.err"
         code=$? took=$((SECONDS - start))
         case $code in
-        0) status=done ;;
+        0) status='done' ;;
         124 | 137) status=timeout ;;
         *) status=failed ;;
         esac
         is_wrong "$name" && status=wrong
     fi
     case $status in
-    done) ;;
+    'done') ;;
     wrong) wrong=yes ;;
     *) failed=yes ;;
     esac
-    printf '%s\t%s\t%s\t%s\n' "$name" "$status" "$code" "$took" >>"$out/parts.tsv"
+    why=
+    [ "$status" = 'done' ] || [ "$status" = skipped ] || why=$(reason "$name")
+    printf '%s\t%s\t%s\t%s\t%s\n' "$name" "$status" "$code" "$took" "$why" >>"$out/parts.tsv"
     say "$(printf '%4d s  %-21s %-8s %s' $((SECONDS - begin)) "$name" "$status" "$(digest "$name")")"
-    [ "$status" = done ] || [ ! -s "$out/$name.err" ] || say "        $(grep -m 1 -i error "$out/$name.err" || tail -n 1 "$out/$name.err")"
+    [ -z "$why" ] || say "        $why"
     find "$out" -maxdepth 1 \( -name '*.out' -o -name '*.err' \) -empty -delete
     archive
 done <<<"$parts"

@@ -36,11 +36,12 @@ def read(archive):
 
 
 def parsed(files, name):
-    """A JSON file, or None where it is missing or was cut off."""
+    """The result in a JSON file, or None where it is missing, was cut off, or tells an error."""
     try:
-        return json.loads(files[name + ".json"])
+        result = json.loads(files[name + ".json"])
     except (KeyError, ValueError):
         return None
+    return None if "error" in result else result
 
 
 def collect(files):
@@ -48,7 +49,7 @@ def collect(files):
     meta = dict(line.split(" ", 1) for line in files.get("meta.txt", "").splitlines() if " " in line)
     planned = files.get("planned.txt", "").split()
     rows = [line.split("\t") for line in files.get("parts.tsv", "").splitlines()[1:]]
-    ran = {row[0]: {"status": row[1], "seconds": int(row[3])} for row in rows if len(row) == 4}
+    ran = {row[0]: {"status": row[1], "seconds": int(row[3]), "reason": row[4]} for row in rows if len(row) == 5}
     parts = {name: ran.get(name, {"status": MISSING}) for name in planned}
     measured = {name: parsed(files, name) for name in parts if name not in ("scene", "kernels", "deterministic")}
     adapters = (measured.pop("adapters", None) or {}).get("adapters", [])
@@ -190,7 +191,7 @@ def report(result):
     title = f"{adapter['name']} over {adapter['backend']}, {result['date']}" if adapter else f"no adapter, {result['date']}"
     features = ", ".join(adapter["features"]) if adapter else MISSING
     matrices = [f"{size['m']}x{size['n']}x{size['k']} {size['factors']} into {size['sums']}" for size in (adapter or {}).get("cooperative_matrices", [])]
-    parts = [[name, part["status"], part.get("seconds", "-")] for name, part in result["parts"].items()]
+    parts = [[name, part["status"], part.get("reason", ""), part.get("seconds", "-")] for name, part in result["parts"].items()]
     sections = {
         None: "\n".join([
             f"- Driver: {adapter['driver'] if adapter else MISSING}",
@@ -210,7 +211,7 @@ def report(result):
         "Other settings": sweeps_section(result),
         "Trainings, all test views": trainings_section(result),
         "Rendering": f"A view of {side(result)}x{side(result)} pixels, median: {view_ms(result)} ms.",
-        "What ran": table(["part", "status", "seconds"], parts, left=2),
+        "What ran": table(["part", "status", "why", "seconds"], parts, left=3),
     }
     return f"# {title}\n" + "".join(f"\n{'## ' + name + chr(10) * 2 if name else ''}{text}\n" for name, text in sections.items())
 

@@ -152,6 +152,20 @@ fn wrong_kernels_are_in_the_exit_code() {
 }
 
 #[test]
+fn errors_are_not_taken_for_wrong_kernels_or_results() {
+    for (broken, line) in [
+        ("train_lego_12s", "| train_lego_12s | failed | the device was lost | 0 |"),
+        ("exchange", "| check_exchange | failed | the device was lost | 0 |"),
+    ] {
+        let machine = Machine::new(&format!("broken_{broken}"));
+        assert_eq!(machine.run(&[("BROKEN", broken)]), Some(2), "{broken}");
+        let (merged, report, _) = machine.results();
+        assert_eq!((count(&merged, "done"), count(&merged, "failed")), (PARTS - 1, 1), "{broken}");
+        assert!(report.contains(line), "{report}");
+    }
+}
+
+#[test]
 fn parts_without_time_are_left_out_and_told() {
     let machine = Machine::new("short");
     assert_eq!(machine.run(&[("SECONDS_ALL", "30")]), Some(2));
@@ -175,6 +189,6 @@ fn a_killed_call_leaves_what_was_known() {
     assert_eq!(call.wait().expect("ended").signal(), Some(9));
     let (merged, report, readme) = machine.results();
     assert_eq!((count(&merged, "done"), count(&merged, "missing")), (11, PARTS - 11));
-    assert!(report.contains("| render | missing | - |"), "{report}");
+    assert!(report.contains("| render | missing |  | - |"), "{report}");
     assert!(readme.contains("missing / missing / missing / missing | missing | missing |"), "{readme}");
 }

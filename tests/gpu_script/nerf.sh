@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Stands in for nerf in the tests of scripts/gpu.sh: answers at once, in the same words. WRONG names a path whose kernels
-# are wrong.
+# are wrong, BROKEN a path or a training that ends with an error.
 out=
 for ((i = 1; i <= $#; i++)); do
     next=$((i + 1))
@@ -14,6 +14,10 @@ adapters)
     printf '%s\n' '{"adapters":[{"index":0,"name":"Test GPU (rev 2)","kind":"DiscreteGpu","backend":"Vulkan","driver":"test 1.0","max_binding_bytes":1024,"features":["timestamps"],"subgroup_sizes":[32,32],"cooperative_matrices":[{"m":16,"n":16,"k":16,"factors":"F16","sums":"F32"}],"limits":{}}]}'
     ;;
 check)
+    if [ "${BROKEN:-}" = "${path:-own}" ]; then
+        printf '{"error":"error: the device was lost"}\n'
+        exit 1
+    fi
     if [ "${WRONG:-}" = "${path:-own}" ]; then
         printf '{"pass":false,"kernels":[{"name":"hash grid: features","pass":false}],"rays":[]}\n'
         exit 1
@@ -22,6 +26,10 @@ check)
     ;;
 generate) mkdir -p "$out" ;;
 train)
+    if [ "${BROKEN:-}" = "${out##*/}" ]; then
+        printf '{"error":"error: the device was lost\\n\\n  tip: none"}\n'
+        exit 1
+    fi
     mkdir -p "$out"
     printf 'weights\n' >"$out/checkpoint.safetensors"
     printf '{"step":16}\n' >"$out/log.jsonl"
