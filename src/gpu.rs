@@ -28,7 +28,7 @@ pub struct Gpu {
 }
 
 /// Features that speed the training up and are used wherever the adapter has them.
-const WANTED_FEATURES: wgpu::Features = wgpu::Features::SHADER_FLOAT32_ATOMIC
+pub const WANTED_FEATURES: wgpu::Features = wgpu::Features::SHADER_FLOAT32_ATOMIC
     .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
     .union(wgpu::Features::CLEAR_TEXTURE)
     .union(wgpu::Features::SUBGROUP)
@@ -40,19 +40,23 @@ impl Gpu {
     /// # Errors
     /// When the driver refuses to create the device.
     pub fn open(adapter: &wgpu::Adapter) -> Result<Self> {
-        Self::open_with(adapter, wgpu::Features::empty())
+        Self::open_with(adapter, WANTED_FEATURES, adapter.limits())
     }
 
-    /// As [`Gpu::open`], with those of `further` features that it has.
+    /// Opens `adapter` with these limits and those of `features` that it has.
     ///
     /// # Errors
-    /// As [`Gpu::open`].
-    pub fn open_with(adapter: &wgpu::Adapter, further: wgpu::Features) -> Result<Self> {
+    /// When the driver refuses to create the device.
+    pub fn open_with(
+        adapter: &wgpu::Adapter,
+        features: wgpu::Features,
+        limits: wgpu::Limits,
+    ) -> Result<Self> {
         let info = adapter.get_info();
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("nerf"),
-            required_features: adapter.features() & (WANTED_FEATURES | further),
-            required_limits: adapter.limits(),
+            required_features: adapter.features() & features,
+            required_limits: limits,
             memory_hints: wgpu::MemoryHints::Performance,
             ..Default::default()
         };

@@ -90,6 +90,10 @@ fn advice(needed: u64, available: u64) -> String {
 pub fn available_bytes() -> Option<u64> {
     let memory = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
     let system = System::new_with_specifics(memory);
+    // Without /proc nothing is known, and sysinfo panics when asked for the container's limits.
+    if system.total_memory() == 0 {
+        return None;
+    }
     let free = system.available_memory();
     let limited = system.cgroup_limits().map_or(free, |limits| limits.free_memory.min(free));
     (limited > 0).then_some(limited)

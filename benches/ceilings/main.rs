@@ -12,7 +12,7 @@ use nerf::gpu::buffer::Buffer;
 use nerf::gpu::kernel::Kernel;
 use nerf::gpu::pass::{GROUP_COLUMNS, Stage};
 use nerf::gpu::source::Source;
-use nerf::gpu::{Gpu, adapter};
+use nerf::gpu::{Gpu, WANTED_FEATURES, adapter};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::iter::repeat_n;
@@ -36,6 +36,10 @@ const FLOPS_OF_ROUND: usize = 8 * 4 * 2;
 /// Dispatches of one submission, and submissions, whose times are averaged.
 const DISPATCHES: usize = 512;
 const SUBMISSIONS: usize = 64;
+
+/// What atomics of 64 bits need.
+const LONG_INTEGERS: wgpu::Features =
+    wgpu::Features::SHADER_INT64.union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS);
 
 /// Measures what an adapter can do at most.
 #[derive(Debug, Parser)]
@@ -74,8 +78,8 @@ struct Bench {
 
 fn main() -> Result<()> {
     let args = Args::parse();
-    let further = wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS;
-    let gpu = Gpu::open_with(&adapter::choose(args.adapter.as_deref())?, further)?;
+    let adapter = adapter::choose(args.adapter.as_deref())?;
+    let gpu = Gpu::open_with(&adapter, WANTED_FEATURES | LONG_INTEGERS, adapter.limits())?;
     let sink = gpu.storage::<[f32; 4]>("sink", SINK)?;
     let result = Bench { gpu, seconds: args.seconds, sink }.run()?;
     if let Some(file) = &args.out {
@@ -89,7 +93,6 @@ impl Bench {
     fn run(&self) -> Result<Value> {
         let info = &self.gpu.info;
         let has = |features| self.gpu.has(features);
-        let long = wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS;
         let [small, middle, large] = TABLES.map(|bytes| self.gathers(bytes));
         let adds = |part, bytes, is_there: bool| is_there.then(|| self.adds(part, bytes)).transpose();
         let submission = self.submission()?;
@@ -103,7 +106,7 @@ impl Bench {
                 "float": adds(part!("add_float"), 4, has(wgpu::Features::SHADER_FLOAT32_ATOMIC))?,
                 "exchange": adds(part!("add_exchange"), 4, true)?,
                 "integer": adds(part!("add_integer"), 4, true)?,
-                "long integer": adds(part!("add_long"), 8, has(long))?,
+                "long integer": adds(part!("add_long"), 8, has(LONG_INTEGERS))?,
             },
             "dispatch_seconds": self.dispatch()?,
             "submission_seconds": submission,

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use nerf::check::{Forced, Setup, Subject, Tally, Workbench};
+use nerf::config::Accumulation;
+use nerf::gpu::tensor::Memory;
 use nerf::gpu::{Gpu, adapter};
+use nerf::kernels::layer::Product;
 
 /// The adapter under test with these variants.
 pub(crate) fn subject_with(forced: Forced) -> Result<Subject> {
@@ -12,6 +15,19 @@ pub(crate) fn subject_with(forced: Forced) -> Result<Subject> {
     let needed = "these tests need a Vulkan, Metal or DX12 adapter; a software driver will do";
     let adapter = adapter::choose(choice.as_deref()).context(needed)?;
     Subject::new(&Arc::new(Gpu::open(&adapter)?), forced)
+}
+
+/// The adapter under test with no more than WebGPU guarantees, and what a modest GPU takes.
+pub(crate) fn modest_subject() -> Result<Subject> {
+    let choice = std::env::var("NERF_ADAPTER").ok();
+    let limits = wgpu::Limits::default();
+    let gpu = Gpu::open_with(&adapter::choose(choice.as_deref())?, wgpu::Features::empty(), limits)?;
+    let forced = Forced {
+        accumulation: Some(Accumulation::Exchange),
+        memory: Some(Memory::Buffers),
+        product: Some(Product { rows: 2, shared_weights: false }),
+    };
+    Subject::new(&Arc::new(gpu), forced)
 }
 
 /// The adapter under test with what its plan chooses.

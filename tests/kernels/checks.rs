@@ -11,7 +11,7 @@ use nerf::config::Accumulation;
 use nerf::gpu::tensor::Memory;
 use nerf::kernels::layer::Product;
 
-use crate::bench::{passes, subject, subject_with};
+use crate::bench::{modest_subject, passes, subject, subject_with};
 
 #[test]
 fn exponentials() -> Result<()> {
@@ -191,5 +191,15 @@ fn tensors_in_buffers() -> Result<()> {
     passes(loss::further_terms(&subject)?);
     let setups = step::setups();
     passes([step::one_step(&subject, &[setups[0].clone(), setups[4].clone()])?]);
+    Ok(())
+}
+
+/// Browsers and modest GPUs have eight storage buffers, 128 MiB of each, and none of the features that others have.
+#[test]
+fn what_webgpu_guarantees_is_enough() -> Result<()> {
+    let subject = modest_subject()?;
+    passes([rays::training_rays(&subject)?, step::one_step(&subject, &step::setups())?]);
+    passes(loss::further_terms(&subject)?);
+    passes(view::rendered_views(&subject)?);
     Ok(())
 }
