@@ -164,7 +164,10 @@ fn json_is_one_object_also_when_failing() {
         serde_json::from_slice(&assert.get_output().stdout).expect("one JSON value")
     };
     let listing = object(&["adapters"], 0);
-    assert_eq!(listing["adapters"][0]["index"], 0);
+    let adapter = &listing["adapters"][0];
+    assert_eq!(adapter["index"], 0);
+    assert!(adapter["limits"]["maxStorageBuffersPerShaderStage"].as_u64() >= Some(8), "{adapter}");
+    assert!(adapter["subgroup_sizes"].is_array() && adapter["cooperative_matrices"].is_array(), "{adapter}");
     let made = object(&["generate", "fog", "--views", "3", "--size", "8x6", "--out", "fog"], 0);
     assert_eq!((&made["scene"], &made["views"]), (&Value::from("fog"), &Value::from(3)));
     assert_eq!(object(&["generate", "--list"], 0)["scenes"].as_array().map(Vec::len), Some(3));
