@@ -117,15 +117,15 @@ def ceilings_section(result):
     if not ceilings:
         return MISSING
     rows = [
-        ["multiply-adds, TFLOP/s", number(ceilings["flops_per_second"], 3, 1e-12)],
-        ["copy, read and written, GB/s", number(ceilings["copied_bytes_per_second"], 1, 1e-9)],
+        ["multiply-adds, TFLOP/s", number(ceilings.get("flops_per_second"), 3, 1e-12)],
+        ["copy, read and written, GB/s", number(ceilings.get("copied_bytes_per_second"), 1, 1e-9)],
     ]
-    for size, rate in ceilings["gathers_per_second"].items():
+    for size, rate in ceilings.get("gathers_per_second", {}).items():
         rows.append([f"gathers of 8 bytes from {size}, G/s", number(rate, 2, 1e-9)])
-    for kind, rate in ceilings["atomics_per_second"].items():
+    for kind, rate in ceilings.get("atomics_per_second", {}).items():
         rows.append([f"atomics at random addresses, {kind}, G/s", number(rate, 2, 1e-9)])
     for key, name in [("dispatch", "a dispatch behind another"), ("submission", "submit and wait"), ("read_back", "read-back")]:
-        rows.append([f"{name}, µs", number(ceilings[f"{key}_seconds"], 1, 1e6)])
+        rows.append([f"{name}, µs", number(ceilings.get(f"{key}_seconds"), 1, 1e6)])
     return table(["ceiling", "measured"], rows)
 
 

@@ -21,7 +21,7 @@ use std::time::Instant;
 
 const MIB: usize = 1 << 20;
 /// Sizes of the tables that are gathered from.
-const TABLES: [usize; 3] = [4 * MIB, 16 * MIB, 64 * MIB];
+const TABLES: [(&str, usize); 3] = [("4 MiB", 4 * MIB), ("16 MiB", 16 * MIB), ("64 MiB", 64 * MIB)];
 /// Of the table that is added to: 2^19 entries of 16 levels have 64 MiB, but most levels fewer.
 const SUMS: usize = 16 * MIB;
 /// Of each of the two buffers of a copy; less where the adapter binds less.
@@ -81,37 +81,50 @@ fn main() -> Result<()> {
     let adapter = adapter::choose(args.adapter.as_deref())?;
     let gpu = Gpu::open_with(&adapter, WANTED_FEATURES | LONG_INTEGERS, adapter.limits())?;
     let sink = gpu.storage::<[f32; 4]>("sink", SINK)?;
-    let result = Bench { gpu, seconds: args.seconds, sink }.run()?;
-    if let Some(file) = &args.out {
-        std::fs::write(file, format!("{result}\n")).with_context(|| format!("writing {}", file.display()))?;
-    }
+    let save = |result: &Value| match &args.out {
+        Some(file) => {
+            std::fs::write(file, format!("{result}\n")).with_context(|| format!("writing {}", file.display()))
+        }
+        None => Ok(()),
+    };
+    let result = Bench { gpu, seconds: args.seconds, sink }.run(&save)?;
     let text = if args.json { result.to_string() } else { table(&result) };
     Ok(writeln!(std::io::stdout(), "{text}")?)
 }
 
 impl Bench {
-    fn run(&self) -> Result<Value> {
+    /// Measures everything; `save` is given what is known each time that there is more.
+    fn run(&self, save: &dyn Fn(&Value) -> Result<()>) -> Result<Value> {
         let info = &self.gpu.info;
-        let has = |features| self.gpu.has(features);
-        let [small, middle, large] = TABLES.map(|bytes| self.gathers(bytes));
-        let adds = |part, bytes, is_there: bool| is_there.then(|| self.adds(part, bytes)).transpose();
-        let submission = self.submission()?;
-        Ok(json!({
+        let mut result = json!({
             "adapter": info.name,
             "driver": format!("{} {}", info.driver, info.driver_info).trim(),
-            "flops_per_second": self.multiply_adds()?,
-            "copied_bytes_per_second": self.copies()?,
-            "gathers_per_second": { "4 MiB": small?, "16 MiB": middle?, "64 MiB": large? },
-            "atomics_per_second": {
-                "float": adds(part!("add_float"), 4, has(wgpu::Features::SHADER_FLOAT32_ATOMIC))?,
-                "exchange": adds(part!("add_exchange"), 4, true)?,
-                "integer": adds(part!("add_integer"), 4, true)?,
-                "long integer": adds(part!("add_long"), 8, has(LONG_INTEGERS))?,
-            },
-            "dispatch_seconds": self.dispatch()?,
-            "submission_seconds": submission,
-            "read_back_seconds": self.read_back()?,
-        }))
+        });
+        let mut add = |kind: &str, name: Option<&str>, value: Option<f64>| {
+            match name {
+                Some(name) => result[kind][name] = json!(value),
+                None => result[kind] = json!(value),
+            }
+            save(&result)
+        };
+        add("flops_per_second", None, Some(self.multiply_adds()?))?;
+        add("copied_bytes_per_second", None, Some(self.copies()?))?;
+        for (name, bytes) in TABLES {
+            add("gathers_per_second", Some(name), Some(self.gathers(bytes)?))?;
+        }
+        for (name, part, bytes, needed) in [
+            ("float", part!("add_float"), 4, wgpu::Features::SHADER_FLOAT32_ATOMIC),
+            ("exchange", part!("add_exchange"), 4, wgpu::Features::empty()),
+            ("integer", part!("add_integer"), 4, wgpu::Features::empty()),
+            ("long integer", part!("add_long"), 8, LONG_INTEGERS),
+        ] {
+            let rate = self.gpu.has(needed).then(|| self.adds(part, bytes)).transpose()?;
+            add("atomics_per_second", Some(name), rate)?;
+        }
+        add("dispatch_seconds", None, Some(self.dispatch()?))?;
+        add("submission_seconds", None, Some(self.submission()?))?;
+        add("read_back_seconds", None, Some(self.read_back()?))?;
+        Ok(result)
     }
 
     /// A stage of `groups` workgroups of these parts.

@@ -175,14 +175,19 @@ fn main() -> Result<()> {
     say("measuring");
     let throughput = run.train(args.seconds)?;
     ensure!(throughput.samples > 0, "the rays meet nothing: the field is empty");
+    // Should the stages hang, the throughput is known.
+    save(&args, &result(&args, &run, start.as_ref(), &throughput, &[]))?;
     say("timing the stages");
     let stages = run.stages(&ceilings)?;
     let result = result(&args, &run, start.as_ref(), &throughput, &stages);
-    if let Some(file) = &args.out {
-        std::fs::write(file, format!("{result}\n")).with_context(|| format!("writing {}", file.display()))?;
-    }
+    save(&args, &result)?;
     let text = if args.json { result.to_string() } else { table(&result, start, &throughput, &stages) };
     Ok(writeln!(std::io::stdout(), "{text}")?)
+}
+
+fn save(args: &Args, result: &Value) -> Result<()> {
+    let Some(file) = &args.out else { return Ok(()) };
+    std::fs::write(file, format!("{result}\n")).with_context(|| format!("writing {}", file.display()))
 }
 
 fn say(text: &str) {
