@@ -14,6 +14,7 @@ import re
 import statistics
 import sys
 import tarfile
+import zlib
 from pathlib import Path
 
 MISSING = "missing"
@@ -31,7 +32,7 @@ def read(archive):
     with tarfile.open(archive) as tar:
         for member in tar:
             if member.isfile() and KEPT.fullmatch(member.name):
-                files[member.name.removeprefix("./")] = tar.extractfile(member).read().decode(errors="replace")
+                files[Path(member.name).name] = tar.extractfile(member).read().decode(errors="replace")
     return files
 
 
@@ -41,22 +42,23 @@ def parsed(files, name):
         result = json.loads(files[name + ".json"])
     except (KeyError, ValueError):
         return None
-    return None if "error" in result else result
+    return result if isinstance(result, dict) and "error" not in result else None
 
 
 def collect(files):
     """All results as one object."""
     meta = dict(line.split(" ", 1) for line in files.get("meta.txt", "").splitlines() if " " in line)
+    date = meta.get("date", "")
     planned = files.get("planned.txt", "").split()
     rows = [line.split("\t") for line in files.get("parts.tsv", "").splitlines()[1:]]
-    ran = {row[0]: {"status": row[1], "seconds": int(row[3]), "reason": row[4]} for row in rows if len(row) == 5}
-    parts = {name: ran.get(name, {"status": MISSING}) for name in planned}
+    ran = {row[0]: {"status": row[1], "seconds": row[3], "reason": row[4]} for row in rows if len(row) == 5}
+    parts = {name: ran.get(name, {"status": MISSING}) for name in [*planned, *(name for name in ran if name not in planned)]}
     measured = {name: parsed(files, name) for name in parts if name not in ("scene", "kernels", "deterministic")}
     adapters = (measured.pop("adapters", None) or {}).get("adapters", [])
-    used = measured.get("ceilings") or measured.get("step") or {}
+    used = next((result for name in ("ceilings", "step", "check") if (result := measured.get(name))), {})
     listed = [adapter for adapter in adapters if adapter["name"] == used.get("adapter")] or adapters
     return {
-        "date": meta.get("date", "unknown"),
+        "date": date if re.fullmatch(r"\d{4}-\d\d-\d\d", date) else "unknown-date",
         "commit": meta.get("commit", "unknown"),
         "rehearsal": meta.get("rehearsal") == "1",
         "adapter": listed[0] if listed else None,
@@ -77,10 +79,23 @@ def kernel_tests(text):
     return {"verdict": f"{verdict[1]} passed, {verdict[2]} failed", "failed": failed}
 
 
+def cell(value):
+    """What a table can hold."""
+    return re.sub(r"\s+", " ", str(value)).replace("|", "\\|")
+
+
 def table(head, rows, left=1):
     """Markdown; the first columns are text, the others numbers."""
     align = ["---"] * left + ["---:"] * (len(head) - left)
-    return "\n".join("| " + " | ".join(map(str, row)) + " |" for row in [head, align, *rows])
+    return "\n".join("| " + " | ".join(map(cell, row)) + " |" for row in [head, align, *rows])
+
+
+def guarded(section, result):
+    """A section, or `missing` where what was measured is not as it should be."""
+    try:
+        return section(result)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ZeroDivisionError):
+        return MISSING
 
 
 def number(value, digits=2, scale=1.0):
@@ -95,7 +110,7 @@ def psnr(result, name):
 def view_ms(result):
     """The median view; the first one also loads the kernels."""
     render = result["measured"].get("render")
-    return number(statistics.median(render["seconds"][1:]), 1, 1e3) if render else MISSING
+    return number(statistics.median(render["seconds"][1:] or render["seconds"]), 1, 1e3) if render else MISSING
 
 
 def side(result):
@@ -143,7 +158,7 @@ def step_section(result):
     ms, rate = throughput(step)
     per_step = {key: sums[key] // max(sums["steps"], 1) for key in ("rays", "marched", "samples")}
     lines = [
-        f"{ms:.2f} ms a step, {rate:.1f} million kept samples a second: {per_step['rays']} rays, {per_step['marched']} marched and "
+        f"On {step['dataset']}: {ms:.2f} ms a step, {rate:.1f} million kept samples a second: {per_step['rays']} rays, {per_step['marched']} marched and "
         f"{per_step['samples']} kept samples of {batch['kept']} a step, {step['device_bytes'] / 2**20:.0f} MiB on the device.",
     ]
     if step["cold_start"]:
@@ -152,7 +167,7 @@ def step_section(result):
     rows = []
     for stage in step["stages"]:
         work, ceiling = stage["work"] or {}, stage["ceiling"]
-        rates = [work.get(kind, 0) / stage["ms_per_step"] / 1e6 for kind in ("flops", "bytes", "gathers", "atomics")]
+        rates = [work.get(kind, 0) / max(stage["ms_per_step"], 1e-9) / 1e6 for kind in ("flops", "bytes", "gathers", "atomics")]
         rows.append([
             stage["stage"],
             number(stage["ms_per_step"], 3),
@@ -161,7 +176,9 @@ def step_section(result):
             f"{100 * ceiling['share']:.0f} % {ceiling['bound_by']}" if ceiling else "-",
         ])
     head = ["stage", "ms", "%", "GFLOP/s", "GB/s", "G gathers/s", "G atomics/s", "of the ceiling"]
-    lines.append(table(head, rows) if rows else "The adapter has no timestamps: stages are not timed.")
+    timed = "timestamps" in (result["adapter"] or {}).get("features", ["timestamps"])
+    without = f"Stages: {MISSING}" if timed else "The adapter has no timestamps: stages are not timed."
+    lines.append(table(head, rows) if rows else without)
     return "\n\n".join(lines)
 
 
@@ -170,8 +187,10 @@ def sweeps_section(result):
     rows = []
     for name in ["step", *names]:
         step = result["measured"].get(name)
-        cells = [number(value) for value in throughput(step)] if step else [MISSING] * 2
-        rows.append([name.replace("sweep_", "").replace("_", " "), *cells, number(step["device_bytes"], 0, 2**-20) if step else MISSING])
+        cells = [MISSING] * 3
+        if step:
+            cells = [*(number(value) for value in throughput(step)), number(step["device_bytes"], 0, 2**-20)]
+        rows.append([name.replace("sweep_", "").replace("_", " "), *cells])
     return table(["setting", "ms a step", "M samples/s", "MiB on the device"], rows)
 
 
@@ -206,11 +225,11 @@ def report(result):
             f"- Kernel tests: {result['kernel_tests']['verdict']}{''.join(' ' + name for name in result['kernel_tests']['failed'])}",
             f"- `--deterministic` twice: {result['deterministic']}",
         ]),
-        "What the adapter can do": ceilings_section(result),
-        f"A step of the GPU defaults, generated photos of {side(result)}x{side(result)} pixels": step_section(result),
-        "Other settings": sweeps_section(result),
-        "Trainings, all test views": trainings_section(result),
-        "Rendering": f"A view of {side(result)}x{side(result)} pixels, median: {view_ms(result)} ms.",
+        "What the adapter can do": guarded(ceilings_section, result),
+        f"A step of the GPU defaults, generated photos of {side(result)}x{side(result)} pixels": guarded(step_section, result),
+        "Other settings": guarded(sweeps_section, result),
+        "Trainings, all test views": guarded(trainings_section, result),
+        "Rendering": f"A view of {side(result)}x{side(result)} pixels, median: {guarded(view_ms, result)} ms.",
         "What ran": table(["part", "status", "why", "seconds"], parts, left=3),
     }
     return f"# {title}\n" + "".join(f"\n{'## ' + name + chr(10) * 2 if name else ''}{text}\n" for name, text in sections.items())
@@ -225,20 +244,23 @@ def readme_row(result):
         result["date"],
         right,
         result["deterministic"],
-        number(throughput(step)[0]) if step else MISSING,
+        guarded(lambda _: number(throughput(step)[0]), result),
         " / ".join(psnr(result, f"train_lego_{budget}s") for budget in BUDGETS),
         " / ".join(psnr(result, f"train_scene_{budget}s") for budget in BUDGETS),
         psnr(result, "train_fox_12s"),
-        view_ms(result),
+        guarded(view_ms, result),
     ]
 
 
 def readme_table(results):
     rows = []
     for path in sorted(results.glob("*/gpu.json")):
-        result = {**json.loads(path.read_text()), "folder": path.parent.name}
-        if not result["rehearsal"]:
-            rows.append(readme_row(result))
+        try:
+            result = {**json.loads(path.read_text(encoding="utf-8")), "folder": path.parent.name}
+            if not result["rehearsal"]:
+                rows.append(readme_row(result))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            print(f"warning: {path} is left out: {type(error).__name__} {error}", file=sys.stderr)
     budgets = " / ".join(BUDGETS)
     head = [
         "adapter", "date", "`nerf check`", "`--deterministic` twice", "ms a step", f"lego_200 after {budgets} s, dB",
@@ -246,6 +268,25 @@ def readme_table(results):
     ]
     rows = rows or [["none yet", *["-"] * (len(head) - 1)]]
     return table(head, rows, left=4)
+
+
+def write(path, text):
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        file.write(text)
+
+
+def free_folder(results, name, result):
+    """A folder that holds nothing yet, or the same result."""
+    for number in range(1, 1000):
+        folder = results / (name if number == 1 else f"{name}_{number}")
+        try:
+            if json.loads((folder / "gpu.json").read_text(encoding="utf-8")) == result:
+                return folder
+        except FileNotFoundError:
+            return folder
+        except ValueError:
+            pass
+    sys.exit(f"error: {results} has a thousand folders called {name}")
 
 
 def main():
@@ -256,25 +297,28 @@ def main():
     readme = Path(sys.argv[3]) if len(sys.argv) > 3 else root / "README.md"
     try:
         files = read(sys.argv[1])
-    except (OSError, tarfile.TarError) as error:
+    except (OSError, EOFError, zlib.error, tarfile.TarError) as error:
         sys.exit(f"error: expected an archive of scripts/gpu.sh, found {sys.argv[1]}: {error}")
     if "meta.txt" not in files:
         sys.exit(f"error: {sys.argv[1]} has no meta.txt: it is no archive of scripts/gpu.sh")
     result = collect(files)
     name = result["adapter"]["name"].split("(")[0] if result["adapter"] else "no adapter"
-    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
-    folder = results / f"{result['date']}_{slug}{'_rehearsal' if result['rehearsal'] else ''}"
+    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:60] or "unnamed"
+    folder = free_folder(results, f"{result['date']}_{slug}{'_rehearsal' if result['rehearsal'] else ''}", result)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "gpu.json").write_text(json.dumps(result, indent=1) + "\n")
-    (folder / "report.md").write_text(report(result))
+    write(folder / "gpu.json", json.dumps(result, indent=1) + "\n")
+    write(folder / "report.md", report(result))
     if "kernels.txt" in files:
-        (folder / "kernels.txt").write_text(files["kernels.txt"])
+        write(folder / "kernels.txt", files["kernels.txt"])
     print(folder / "report.md")
-    text = readme.read_text()
+    with open(readme, encoding="utf-8", newline="") as file:
+        text = file.read()
     if BEGIN not in text or END not in text:
         sys.exit(f"error: {readme} has no lines '{BEGIN}' and '{END}'; the table is not written")
     before, rest = text.split(BEGIN, 1)
-    readme.write_text(f"{before}{BEGIN}\n{readme_table(results)}\n{END}{rest.split(END, 1)[1]}")
+    end = "\r\n" if "\r\n" in text else "\n"
+    lines = [BEGIN, *readme_table(results).splitlines(), END]
+    write(readme, before + end.join(lines) + rest.split(END, 1)[1])
 
 
 if __name__ == "__main__":

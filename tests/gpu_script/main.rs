@@ -68,6 +68,23 @@ impl Machine {
     }
 }
 
+impl Machine {
+    /// The results of an archive without any adapter.
+    fn merged(&self) -> Value {
+        let pages = self.folder.join("pages");
+        let readme = self.folder.join("none.md");
+        // Without its two lines the README is not written, and that is an error.
+        fs::write(&readme, "").expect("writable");
+        Command::new("python3")
+            .arg(Path::new(ROOT).join("scripts/gpu_results.py"))
+            .args([&self.folder.join("results/results.tar.gz"), &pages, &readme])
+            .assert()
+            .failure();
+        let page = fs::read_dir(&pages).expect("pages").next().expect("a folder").expect("an entry").path();
+        serde_json::from_str(&fs::read_to_string(page.join("gpu.json")).expect("text")).expect("JSON")
+    }
+}
+
 fn copy(from: &str, to: &Path) {
     fs::copy(Path::new(ROOT).join(from), to).expect("copied");
     fs::set_permissions(to, fs::Permissions::from_mode(0o755)).expect("executable");
@@ -95,7 +112,7 @@ fn a_whole_call_is_told_in_full() {
         "- `--deterministic` twice: the same, bit for bit",
         "| multiply-adds, TFLOP/s | 50.000 |",
         "| atomics at random addresses, long integer, G/s | - |",
-        "5.00 ms a step, 50.0 million kept samples a second",
+        "On scene: 5.00 ms a step, 50.0 million kept samples a second",
         "| encode | 0.500 | 10.0 | 2000.0 | 200.0 | 160.0 | - | 42 % gathers |",
         "| kept 16 | 5.00 | 50.00 | 1 |",
         "| lego 1.5s | 12.0 | 100 | 34.57 | 0.9876 | 25 | 0 |",
@@ -144,7 +161,12 @@ fn wrong_kernels_are_in_the_exit_code() {
         ("kernels", "36 passed, 1 failed grid::one_feature_by_hand"),
     ] {
         let machine = Machine::new(&format!("wrong_{wrong}"));
-        assert_eq!(machine.run(&[("WRONG", wrong), ("FAIL", "ceilings")]), Some(1), "{wrong}");
+        let variables = [("WRONG", wrong), ("FAIL", "ceilings")];
+        assert_eq!(machine.run(&variables), Some(1), "{wrong}");
+        // Nobody listens.
+        let (_, stderr) = std::io::pipe().expect("a pipe");
+        let status = machine.script(&variables).stderr(stderr).status().expect("bash");
+        assert_eq!(status.code(), Some(1), "{wrong}");
         let (merged, report, _) = machine.results();
         assert_eq!((count(&merged, "wrong"), count(&merged, "failed")), (1, 1), "{wrong}");
         assert!(report.contains(told), "{report}");
@@ -153,12 +175,18 @@ fn wrong_kernels_are_in_the_exit_code() {
 
 #[test]
 fn errors_are_not_taken_for_wrong_kernels_or_results() {
-    for (broken, line) in [
-        ("train_lego_12s", "| train_lego_12s | failed | the device was lost | 0 |"),
-        ("exchange", "| check_exchange | failed | the device was lost | 0 |"),
+    for (variable, broken, line) in [
+        (
+            "DIVERGED",
+            "train_lego_12s",
+            "| train_lego_12s | failed | error: the training has no PSNR: it diverged | 0 |",
+        ),
+        ("BROKEN", "train_lego_12s", "| train_lego_12s | failed | the device was lost | 0 |"),
+        ("BROKEN", "exchange", "| check_exchange | failed | the device was lost | 0 |"),
+        ("BROKEN", "kernels", "| kernels | failed |"),
     ] {
-        let machine = Machine::new(&format!("broken_{broken}"));
-        assert_eq!(machine.run(&[("BROKEN", broken)]), Some(2), "{broken}");
+        let machine = Machine::new(&format!("{variable}_{broken}"));
+        assert_eq!(machine.run(&[(variable, broken)]), Some(2), "{broken}");
         let (merged, report, _) = machine.results();
         assert_eq!((count(&merged, "done"), count(&merged, "failed")), (PARTS - 1, 1), "{broken}");
         assert!(report.contains(line), "{report}");
@@ -172,6 +200,41 @@ fn parts_without_time_are_left_out_and_told() {
     let (merged, report, _) = machine.results();
     assert!(count(&merged, "skipped") >= 2 && count(&merged, "done") > 10, "{report}");
     assert!(report.contains("| train_lego_60s | skipped |"), "{report}");
+}
+
+#[test]
+fn odd_places_and_numbers() {
+    let machine = Machine::new("a place with spaces");
+    assert_eq!(machine.run(&[("NEEDS_LIBRARY", "1")]), Some(0), "the bundle's own loader is found");
+    for (name, value) in [("SECONDS_ALL", "9m"), ("SECONDS_ALL", ""), ("LIMIT", "0"), ("LIMIT", "abc")] {
+        let wanted = if value.is_empty() { 0 } else { 2 };
+        assert_eq!(machine.run(&[(name, value)]), Some(wanted), "{name}={value}");
+    }
+    assert_eq!(machine.run(&[("SECONDS_ALL", "010")]), Some(2), "eight or more parts do not begin");
+    let file = machine.folder.join("file");
+    fs::write(&file, "").expect("writable");
+    let mut command = std::process::Command::new(machine.folder.join("bundle/gpu.sh"));
+    assert_eq!(command.arg(file).output().expect("bash").status.code(), Some(2));
+}
+
+/// A call that is told to stop leaves nothing of an earlier one, and nothing that runs.
+#[test]
+fn a_stopped_call_tells_so() {
+    let machine = Machine::new("stopped");
+    assert_eq!(machine.run(&[]), Some(0));
+    let mut call = machine.script(&[("HANG", "adapters")]).stderr(Stdio::null()).spawn().expect("bash");
+    let summary = machine.folder.join("results/summary.txt");
+    let begin = Instant::now();
+    while fs::read_to_string(&summary).is_ok_and(|text| text.contains("train_lego_60s")) {
+        assert!(begin.elapsed() < Duration::from_secs(30), "the earlier summary is still there");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(500));
+    Command::new("kill").args(["-TERM", &call.id().to_string()]).assert().success();
+    assert_eq!(call.wait().expect("ended").code(), Some(2));
+    assert!(begin.elapsed() < Duration::from_secs(15), "the part ended with it");
+    assert!(fs::read_to_string(&summary).is_ok_and(|text| text.ends_with("stopped\n")));
+    assert_eq!(count(&machine.merged(), "missing"), PARTS);
 }
 
 #[test]

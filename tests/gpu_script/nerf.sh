@@ -11,6 +11,11 @@ for ((i = 1; i <= $#; i++)); do
 done
 case $1 in
 adapters)
+    # With NEEDS_LIBRARY it finds nothing but with the bundle's own loader.
+    if [ -n "${NEEDS_LIBRARY:-}" ] && [[ ${LD_LIBRARY_PATH:-} != *bundle/lib* ]]; then
+        printf '{"error":"error: no adapter"}\n'
+        exit 1
+    fi
     printf '%s\n' '{"adapters":[{"index":0,"name":"Test GPU (rev 2)","kind":"DiscreteGpu","backend":"Vulkan","driver":"test 1.0","max_binding_bytes":1024,"features":["timestamps"],"subgroup_sizes":[32,32],"cooperative_matrices":[{"m":16,"n":16,"k":16,"factors":"F16","sums":"F32"}],"limits":{}}]}'
     ;;
 check)
@@ -33,6 +38,10 @@ train)
     mkdir -p "$out"
     printf 'weights\n' >"$out/checkpoint.safetensors"
     printf '{"step":16}\n' >"$out/log.jsonl"
+    if [ "${DIVERGED:-}" = "${out##*/}" ]; then
+        printf '{"steps":100,"seconds":12.01,"psnr":null,"ssim":null,"views":25,"skipped":100}\n'
+        exit
+    fi
     printf '{"steps":100,"seconds":12.01,"psnr":34.567,"ssim":0.9876,"views":25,"skipped":0}\n'
     ;;
 render)
