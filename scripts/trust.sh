@@ -46,7 +46,7 @@ check() {
     printf 'check %s\n' "$name" >&2
     # What an adapter lacks is an error of another kind than a broken bound.
     { printf '$ nerf check %s\n' "$*" && on_adapter check "$@"; } >"$work/table" 2>&1 \
-        || grep -q 'does not have\|those of the adapter\|on a GPU like' "$work/table" || failed=yes
+        || grep -q 'does not have it; \|does not have them; \|those of the adapter\|on a GPU like' "$work/table" || failed=yes
     { cat "$work/table" && echo; } | tee -a "$out/check.txt" >&2
 }
 

@@ -8,6 +8,7 @@
 
 use anyhow::{Context, Result};
 use clap::Parser;
+use nerf::file::write_atomically;
 use nerf::gpu::buffer::Buffer;
 use nerf::gpu::kernel::Kernel;
 use nerf::gpu::pass::{GROUP_COLUMNS, Stage};
@@ -82,9 +83,8 @@ fn main() -> Result<()> {
     let gpu = Gpu::open_with(&adapter, WANTED_FEATURES | LONG_INTEGERS, adapter.limits())?;
     let sink = gpu.storage::<[f32; 4]>("sink", SINK)?;
     let save = |result: &Value| match &args.out {
-        Some(file) => {
-            std::fs::write(file, format!("{result}\n")).with_context(|| format!("writing {}", file.display()))
-        }
+        // A call that is killed leaves a whole file.
+        Some(file) => write_atomically(file, |to| Ok(writeln!(to, "{result}")?)),
         None => Ok(()),
     };
     let result = Bench { gpu, seconds: args.seconds, sink }.run(&save)?;

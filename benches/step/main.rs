@@ -161,13 +161,7 @@ fn main() -> Result<()> {
     if args.only_start {
         return only_start(&args, &dataset, began);
     }
-    let ceilings = match &args.ceilings {
-        Some(file) => {
-            let text = std::fs::read(file).with_context(|| format!("reading {}", file.display()))?;
-            serde_json::from_slice(&text).with_context(|| format!("reading {}", file.display()))?
-        }
-        None => Value::Null,
-    };
+    let ceilings = args.ceilings.as_deref().map_or(Value::Null, ceilings);
     let start = if args.no_start { None } else { Some(cold_start(&args, &dataset)?) };
     let mut run = Run::new(&args, &dataset)?;
     say("warming up");
@@ -183,6 +177,15 @@ fn main() -> Result<()> {
     save(&args, &result)?;
     let text = if args.json { result.to_string() } else { table(&result, start, &throughput, &stages) };
     Ok(writeln!(std::io::stdout(), "{text}")?)
+}
+
+/// The ceilings of a file. Without them nothing is compared: that is no reason not to measure.
+fn ceilings(file: &Path) -> Value {
+    let read = std::fs::read(file).map_err(anyhow::Error::new);
+    read.and_then(|text| Ok(serde_json::from_slice(&text)?)).unwrap_or_else(|error| {
+        say(&format!("warning: no ceilings in {}: {error}", file.display()));
+        Value::Null
+    })
 }
 
 fn save(args: &Args, result: &Value) -> Result<()> {

@@ -78,7 +78,7 @@ pub(crate) fn table(stages: &[StageTime]) -> Vec<String> {
     lines.extend(stages.iter().map(|stage| {
         let StageTime { stage: name, ms_per_step: ms, ns_per_sample: ns, share, work, ceiling } = stage;
         let mut line = format!("{name:40} {ms:11.3} {ns:11.1} {:10.1}%", 100.0 * share);
-        if let Some(Work { flops, bytes, gathers, atomics }) = work {
+        if let Some(Work { flops, bytes, gathers, atomics, .. }) = work {
             for amount in [flops, bytes, gathers, atomics] {
                 let rate = amount / ms.max(1e-12) / 1e6;
                 line += &if *amount > 0.0 { format!(" {rate:11.2}") } else { format!(" {:>11}", "-") };

@@ -1,7 +1,7 @@
 //! How much a stage has to do at least: what its formulas multiply, and what it must read and write once, whatever caches
-//! do. What a stage does beyond that (index arithmetic, weights read again) counts for nothing. Caches can take a stage
-//! above the ceiling of memory; so can samples that lie together and levels that are small above that of gathers from
-//! anywhere.
+//! do. What a stage does beyond that (index arithmetic, weights read again) counts for nothing, but Adam counts as if every
+//! entry of the table were touched. Caches can take a stage above the ceiling of memory; so can samples that lie together
+//! and levels that are small above that of gathers from anywhere.
 
 use nerf::config::Accumulation;
 use nerf::kernels::Plan;
@@ -23,10 +23,13 @@ pub(crate) struct Work {
     pub(crate) flops: f64,
     /// Bytes read and written in order.
     pub(crate) bytes: f64,
-    /// Reads of table entries from anywhere.
+    /// Reads of 8 bytes or fewer from anywhere.
     pub(crate) gathers: f64,
-    /// Atomic additions to anywhere.
+    /// Atomic operations anywhere.
     pub(crate) atomics: f64,
+    /// Whether those are of what the occupancy grid holds, not of the hash table.
+    #[serde(skip)]
+    of_occupancy: bool,
 }
 
 /// Rays and samples of a step.
@@ -47,22 +50,40 @@ impl Work {
         let bytes = |bytes: f64| Some(Self { bytes, ..Self::default() });
         match label {
             "rays" => bytes(rays * (4.0 * QUAD + 4.0 * plan.record().words() as f64)),
-            "march" => bytes(rays * (2.0 * QUAD + PAIR)),
+            // A bit of the occupancy grid per step, and a word of the marks per 32.
+            "march" => Some(Self {
+                bytes: rays * (2.0 * QUAD + PAIR) + marched / 8.0,
+                gathers: marched,
+                of_occupancy: true,
+                ..Self::default()
+            }),
             "scan samples" | "scan kept" => bytes(rays * 3.0 * PAIR),
-            "samples" => bytes(rays * (2.0 * QUAD + PAIR) + marched * QUAD),
+            "samples" => bytes(rays * (2.0 * QUAD + PAIR) + marched * (QUAD + 1.0 / 8.0)),
             "encode" => Some(Self {
                 flops: marched * encoding / 2.0 * CORNERS * FLOPS_OF_CORNER,
                 bytes: marched * (QUAD + 4.0 * encoding),
                 gathers: marched * encoding / 2.0 * CORNERS,
-                atomics: 0.0,
+                ..Self::default()
             }),
             "density hidden" => Some(product(&layout.density[0], marched)),
             "density out" => Some(product(&layout.density[1], marched)),
-            "select" => bytes(rays * 20.0 + marched * 2.0 * QUAD + kept * QUAD),
+            // Each sample raises its cell of the occupancy grid.
+            "select" => Some(Self {
+                bytes: rays * 20.0 + marched * 2.0 * QUAD + kept * QUAD,
+                atomics: marched,
+                of_occupancy: true,
+                ..Self::default()
+            }),
             "kept" => bytes(rays * 2.0 * PAIR + kept * (5.0 * QUAD + PAIR)),
             "color input" => bytes(kept * (PAIR + QUAD + 4.0 * (outputs + COLOR_INPUTS as f64))),
             "composite" => bytes(rays * 5.0 * QUAD + kept * 9.0 * QUAD),
             "d density out" => Some(backward(&layout.density[1], kept)),
+            // Only the density network's outputs are wanted, with the gradient that the fused kernel found.
+            "d color 0" => {
+                let first = layout.color.first()?;
+                let work = product(&Layer { inputs: DENSITY_OUTPUTS, ..first.clone() }, kept);
+                Some(Self { bytes: work.bytes + kept * (2.0 * QUAD + PAIR), ..work })
+            }
             "d density hidden" => Some(product(&layout.density[0], kept)),
             "gradient range" => bytes(rays * QUAD + kept * 4.0 * encoding),
             "weight sums" => bytes((plan.chunks as f64 + 1.0) * 4.0 * parameters),
@@ -77,15 +98,14 @@ impl Work {
 
     /// Seconds that it would take at the ceilings that `cargo bench --bench ceilings` measured, and what would take them.
     pub(crate) fn least_seconds(&self, plan: &Plan, ceilings: &Value) -> Option<(f64, &'static str)> {
-        let table_mib = (plan.layout.entries * 8) >> 20;
-        let table = if table_mib <= 4 {
-            "4 MiB"
-        } else if table_mib <= 16 {
-            "16 MiB"
-        } else {
-            "64 MiB"
+        let table = match (plan.layout.entries * 8) >> 20 {
+            _ if self.of_occupancy => "4 MiB",
+            0..=4 => "4 MiB",
+            5..=16 => "16 MiB",
+            _ => "64 MiB",
         };
         let sums = match plan.accumulation {
+            _ if self.of_occupancy => "integer",
             Accumulation::Float => "float",
             Accumulation::Fixed => "integer",
             _ => "exchange",
@@ -136,13 +156,13 @@ fn scatter(plan: &Plan, kept: f64) -> Work {
     let encoding = plan.layout.encoding() as f64;
     let adds = kept * encoding * CORNERS;
     Work {
-        flops: adds,
+        flops: kept * encoding / 2.0 * CORNERS * FLOPS_OF_CORNER,
         bytes: kept * (QUAD + PAIR + 4.0 * encoding),
-        gathers: 0.0,
         atomics: match plan.accumulation {
             Accumulation::Ordered => 0.0,
             Accumulation::Fixed => 2.0 * adds,
             _ => adds,
         },
+        ..Work::default()
     }
 }
