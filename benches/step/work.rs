@@ -81,7 +81,7 @@ impl Work {
             // Only the density network's outputs are wanted, with the gradient that the fused kernel found.
             "d color 0" => {
                 let first = layout.color.first()?;
-                let work = product(&Layer { inputs: DENSITY_OUTPUTS, ..first.clone() }, kept);
+                let work = product(&Layer { inputs: DENSITY_OUTPUTS, ..*first }, kept);
                 Some(Self { bytes: work.bytes + kept * (2.0 * QUAD + PAIR), ..work })
             }
             "d density hidden" => Some(product(&layout.density[0], kept)),
