@@ -46,7 +46,7 @@ parts=(
     'sweep_table_17       25   9'
     'sweep_table_21       25   9'
     'sweep_width_32       25   9'
-    'kernels              60  10'
+    'kernels              90  10'
     'train_scene_60s      90  66'
 )
 
