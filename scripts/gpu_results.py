@@ -4,7 +4,7 @@
 usage: scripts/gpu_results.py ARCHIVE [RESULTS [README]]
   ARCHIVE   results.tar.gz
   RESULTS   folder of results [default: benches/results]; gets DATE_ADAPTER/ with report.md, gpu.json and what was measured
-  README    file whose table is written from all results but rehearsals [default: README.md]
+  README    file whose table is written from the results of GPUs, without rehearsals [default: README.md]
 
 What did not run is called missing. Needs nothing but Python 3.8.
 """
@@ -257,7 +257,7 @@ def readme_table(results):
     for path in sorted(results.glob("*/gpu.json")):
         try:
             result = {**json.loads(path.read_text(encoding="utf-8")), "folder": path.parent.name}
-            if not result["rehearsal"]:
+            if not result["rehearsal"] and (result["adapter"] or {}).get("kind") != "Cpu":
                 rows.append(readme_row(result))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             print(f"warning: {path} is left out: {type(error).__name__} {error}", file=sys.stderr)
