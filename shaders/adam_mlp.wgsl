@@ -1,4 +1,5 @@
-// Adam on the networks' weights; see `weight_sums.wgsl`. Needs: step, adam, usable.
+// Adam on the networks' weights; see `weight_sums.wgsl`.
+// needs: adam, usable
 
 var<storage, read> d_weights: array<vec4<f32>>;
 var<storage, read_write> mlp: array<vec4<f32>>;

@@ -1,5 +1,6 @@
-// Adam on the hash table, two entries per thread. A parameter whose gradient is exactly zero was not touched by
-// this batch: it and its moments stay. Needs: step, adam, gradient.
+// Adam on the hash table, two entries per thread. A parameter whose gradient is exactly zero was not touched by this
+// batch: it and its moments stay.
+// needs: adam, gradient_take
 
 tensor<read_write> table: vec2<f32>;
 // First moments of both features, then the second moments.

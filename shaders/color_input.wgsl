@@ -1,7 +1,6 @@
 // The colour network's input: the density network's outputs and the harmonics of the ray's direction.
-// Needs: counters, ray_load, harmonics.
+// needs: counters, harmonics, ray_load
 
-var<uniform> counters: Counters;
 tensor<read> density_out: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
 // `[kept, 8]`: 16 features, 16 harmonics.

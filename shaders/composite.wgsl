@@ -5,10 +5,8 @@
 // squared error is their product: (R' - g)(R'' - g), whose mean is the square of the mean error. The square of a single
 // estimate would hold its variance too, and gradients would make rays opaque too early, where nothing is left out. A
 // whole ray has one colour, and both are that.
-// Needs: counters, ray_target, ray_result, kept_load, exp, sum, transmittance, loss, depth_loss, distortion, sparsity,
-// weights.
+// needs: counters, depth_loss, distortion, exp, kept_load, loss, ray_result, ray_target, sparsity, sum, transmittance, weights
 
-var<uniform> counters: Counters;
 var<storage, read> kept_spans: array<vec2<u32>>;
 // Optical depth behind the last kept sample.
 var<storage, read> ray_tails: array<f32>;

@@ -1,7 +1,7 @@
-// Hash-grid features of each sample, two levels per thread: one pair of levels per row of
-// workgroups, so that their entries stay in the cache. Needs: counters, grid.
+// Hash-grid features of each sample, two levels per thread: one pair of levels per row of workgroups, so that their
+// entries stay in the cache.
+// needs: counters, grid
 
-var<uniform> counters: Counters;
 tensor<read> samples: vec4<f32>;
 tensor<read> table: vec2<f32>;
 // `[samples, LEVELS / 2]`, the features of two levels in each.

@@ -1,8 +1,7 @@
-// Ends a step: sums the errors of its rays and chooses the number of rays of the next one, so that the kept
-// samples meet their target and the marched ones fit. One workgroup. Needs: counters, ray_result,
-// usable.
+// Ends a step: sums the errors of its rays and chooses the number of rays of the next one, so that the kept samples
+// meet their target and the marched ones fit. One workgroup.
+// needs: counters, ray_result, usable
 
-var<storage, read_write> counters: Counters;
 var<storage, read_write> dispatch: array<vec3<u32>>;
 var<storage, read> ray_results: array<RayResult>;
 var<workgroup> sums: array<vec4<f32>, 64>;

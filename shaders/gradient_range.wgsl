@@ -1,7 +1,6 @@
 // The largest gradient of the encoding and the largest squared error, before any gradient is used.
-// Needs: counters, ray_result, magnitude.
+// needs: counters, magnitude, ray_result
 
-var<uniform> counters: Counters;
 // Two levels in each.
 tensor<read> d_encoding: vec4<f32>;
 var<storage, read> ray_results: array<RayResult>;

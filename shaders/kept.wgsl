@@ -1,6 +1,6 @@
-// Writes the chosen samples of all rays one behind the other. Needs: counters, packing.
+// Writes the chosen samples of all rays one behind the other.
+// needs: counters, packing
 
-var<uniform> counters: Counters;
 var<storage, read> ray_spans: array<vec2<u32>>;
 var<storage, read> kept_spans: array<vec2<u32>>;
 tensor<read> chosen: vec4<f32>;

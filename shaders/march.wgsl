@@ -1,7 +1,6 @@
 // Marks the steps of each ray that lie in occupied cells: one bit per step, and their number.
-// Needs: random, step, counters, ray, occupancy, stepping, extent.
+// needs: counters, extent, march_start, occupancy, ray_load, stepping
 
-var<uniform> counters: Counters;
 tensor<read> occupancy_bits: u32;
 var<storage, read_write> ray_steps: array<u32>;
 // First sample (written by the scan) and number of samples.

@@ -1,7 +1,6 @@
 // One random position in each visited cell of a chunk, as samples for the density network.
-// Needs: random, step, counters, occupancy.
+// needs: counters, occupancy, random, step
 
-var<storage, read_write> counters: Counters;
 // Indices of the cells that can hold something.
 var<storage, read> visible_cells: array<u32>;
 tensor<write> samples: vec4<f32>;

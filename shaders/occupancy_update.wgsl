@@ -1,5 +1,6 @@
 // Raises the visited cells to what the network says; see `reference::occupancy`. Cells that can hold nothing have -1
-// and are not in the list. Needs: step, exp, density, occupancy_raise.
+// and are not in the list.
+// needs: density, occupancy_raise, step
 
 var<storage, read> visible_cells: array<u32>;
 tensor<read> density_out: vec4<f32>;

@@ -1,7 +1,6 @@
 // One training ray per thread: a random pixel of a random image, its ray and its target.
-// Needs: random, step, counters, ray, ray_target, camera, lens, photos_word, pixels, position, depth_target, background.
+// needs: background, camera, counters, depth_target, lens, pixels, position, random, ray_store, ray_target, step
 
-var<uniform> counters: Counters;
 var<storage, read> cameras: array<Camera>;
 var<storage, read_write> ray_targets: array<RayTarget>;
 

@@ -1,7 +1,6 @@
 // Writes the marked steps of each ray as samples: position in box space and length of the step.
-// Needs: random, step, counters, ray, stepping, march_start, extent.
+// needs: counters, extent, march_start, ray_load, stepping
 
-var<uniform> counters: Counters;
 var<storage, read> ray_steps: array<u32>;
 var<storage, read> ray_spans: array<vec2<u32>>;
 // Position, and the step's length in units of the inner cube's side.

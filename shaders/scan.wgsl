@@ -1,8 +1,7 @@
-// Turns the counts in `ray_spans` into first indices (an exclusive prefix sum, in the order of the rays, so
-// that the order of the samples does not depend on scheduling). Rays that exceed CAPACITY get no samples.
-// One workgroup. Needs: counters, and scan_rays / scan_finish of the variant.
+// Turns the counts in `ray_spans` into first indices (an exclusive prefix sum, in the order of the rays, so that the
+// order of the samples does not depend on scheduling). Rays that exceed CAPACITY get no samples. One workgroup.
+// needs: scanned
 
-var<storage, read_write> counters: Counters;
 var<storage, read_write> dispatch: array<vec3<u32>>;
 var<storage, read_write> ray_spans: array<vec2<u32>>;
 var<workgroup> sums: array<u32, 256>;

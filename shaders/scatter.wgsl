@@ -1,7 +1,6 @@
 // The encoding's backward pass: adds each kept sample's gradient to the eight corners of its cells.
-// Needs: counters, grid, corners, usable.
+// needs: corners, counters, usable
 
-var<uniform> counters: Counters;
 tensor<read> samples: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
 // Two levels in each.

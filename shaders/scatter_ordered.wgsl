@@ -1,17 +1,12 @@
-// The encoding's backward pass without atomics: each thread owns one level and adds the kept samples' gradients
-// in their order, so that nothing collides and every sum is the same in every run. For adapters with few
-// threads, where it is three times as fast as atomics. Needs: counters, grid, corners, usable.
+// The encoding's backward pass without atomics: each thread owns one level and adds the kept samples' gradients in
+// their order, so that nothing collides and every sum is the same in every run. For adapters with few threads, where it
+// is three times as fast as atomics.
+// needs: corners, counters, usable
 
-var<uniform> counters: Counters;
 tensor<read> samples: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
 // Two levels in each.
 tensor<read> d_encoding: vec4<f32>;
-tensor<read_write> d_table: vec2<f32>;
-
-fn gradient_add(entry: u32, gradient: vec2<f32>) {
-    d_table_store(entry, d_table_load(entry) + gradient);
-}
 
 @compute @workgroup_size(8)
 fn main(@builtin(local_invocation_id) lane: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>) {

@@ -1,13 +1,12 @@
-// Decides which samples of a ray get colour and gradients. A sample of at least WEIGHT_FLOOR is heavy and is kept.
-// The light ones between two heavy ones form groups of about twice that weight. Of each, one member, drawn by weight,
+// Decides which samples of a ray get colour and gradients. A sample of at least WEIGHT_FLOOR is heavy and is kept. The
+// light ones between two heavy ones form groups of about twice that weight. Of each, one member, drawn by weight,
 // stands for all: its colour has the weight of the group, so that the mean over all draws is the colour of the whole
 // ray. That is done twice, for two estimates of the colour that know nothing of each other; see `composite.wgsl`. A
 // group that stays lighter than LIGHT_SHARE of the floor is kept by chance; what that adds to the ray's weight or takes
 // from it is made up for by the estimate's next kept sample. Opacity and transmittance are those of all samples.
 // Nothing is kept behind the point where the ray is opaque; see `reference::selection`.
-// Needs: random, step, counters, exp, density, occupancy, occupancy_raise.
+// needs: counters, density, exp, occupancy, occupancy_raise, random, step
 
-var<uniform> counters: Counters;
 tensor<read> samples: vec4<f32>;
 tensor<read> density_out: vec4<f32>;
 var<storage, read> ray_spans: array<vec2<u32>>;

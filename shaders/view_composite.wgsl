@@ -1,7 +1,6 @@
 // Adds the colours of a round to a view's rays, and writes the pixels of those that ended.
-// Needs: counters, progress, view_ray.
+// needs: counters, progress, view_ray
 
-var<uniform> counters: Counters;
 var<uniform> progress: Progress;
 var<storage, read> ray_spans: array<vec2<u32>>;
 var<storage, read> kept_spans: array<vec2<u32>>;

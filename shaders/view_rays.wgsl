@@ -1,7 +1,6 @@
 // Begins the rays of the next pixels of a view where slots are free.
-// Needs: counters, progress, ray, view_ray, camera, lens.
+// needs: camera, counters, progress, ray_store, view_ray
 
-var<uniform> counters: Counters;
 var<uniform> progress: Progress;
 var<uniform> view_camera: Camera;
 // How many free slots are in front of it, and 1 where the slot is free.

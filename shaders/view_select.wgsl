@@ -1,9 +1,8 @@
 // Adds the samples of a round to the optical depth, opacity and depth of a view's rays, and decides which of them get
-// colour: wherever the weights since the last one sum to COLOR_WEIGHT. That sample's colour stands for theirs.
-// A ray ends where it is opaque or leaves the box.
-// Needs: counters, view_ray, camera, lens, exp, density, transmittance.
+// colour: wherever the weights since the last one sum to COLOR_WEIGHT. That sample's colour stands for theirs. A ray
+// ends where it is opaque or leaves the box.
+// needs: camera, counters, density, exp, lens, transmittance, view_ray
 
-var<uniform> counters: Counters;
 var<uniform> view_camera: Camera;
 tensor<read> samples: vec4<f32>;
 tensor<read> density_out: vec4<f32>;

@@ -1,4 +1,5 @@
-// The gradients of the networks' weights: L2, and the partial sums of all chunks in a fixed order. Needs: magnitude.
+// The gradients of the networks' weights: L2, and the partial sums of all chunks in a fixed order.
+// needs: magnitude
 
 var<storage, read> mlp: array<vec4<f32>>;
 tensor<read> d_weight_chunks: vec4<f32>;

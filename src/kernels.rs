@@ -3,72 +3,39 @@
 //! Parts for what a scene does not need (a lens, cascades, alpha, …) are not linked, their buffers are not
 //! allocated and their stages are not dispatched.
 
-/// Includes a file of `shaders/` as a [`Part`].
-macro_rules! part {
-    ($path:literal) => {
-        ($path, include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $path)))
-    };
-}
-pub(crate) use part;
-
 pub mod color;
 mod constants;
 pub mod density;
 pub mod layer;
 pub mod lens;
+pub mod link;
 pub mod marching;
 mod memory;
 mod needs;
 pub mod occupancy;
 pub mod photos;
 mod shared;
+mod slots;
 pub mod training;
 pub mod viewing;
 mod workspace;
 
 pub use constants::{RELATIVE_FLOOR, STEP_GROWTH, STEP_SHRINKAGE, dimension};
+pub use link::Link;
 pub use needs::Needs;
-pub use shared::{Camera, Counters, Progress, RayResult, RayTarget, Step};
+pub use shared::{Camera, Counters, LAYOUTS, Progress, RayResult, RayTarget, Step};
 pub use workspace::Workspace;
 
-use crate::config::{Accumulation, Background, ColorLoss, Config, Transmittance};
+use crate::config::{Accumulation, ColorLoss, Config};
+use crate::file::write_atomically;
 use crate::gpu::Gpu;
-use crate::gpu::kernel::{Kernel, Shared};
+use crate::gpu::kernel::Kernel;
 use crate::gpu::pass::Stage;
-use crate::gpu::source::Source;
 use crate::gpu::tensor::Memory;
-use crate::model::{Layout, Level};
+use crate::model::Layout;
 use anyhow::{Result, ensure};
-
-/// A file of WGSL under its name.
-pub type Part = (&'static str, &'static str);
-
-pub(crate) const RANDOM: Part = part!("common/random.wgsl");
-const STEP: Part = part!("common/step.wgsl");
-const COUNTERS: Part = part!("common/counters.wgsl");
-const PROGRESS: Part = part!("common/progress.wgsl");
-pub(crate) const RAY: Part = part!("common/ray.wgsl");
-pub(crate) const SINE: Part = part!("common/sine.wgsl");
-pub(crate) const CAMERA: Part = part!("common/camera.wgsl");
-const RAY_LOAD: Part = part!("common/ray_load.wgsl");
-const RAY_STORE: Part = part!("common/ray_store.wgsl");
-const RAY_TARGET: Part = part!("common/ray_target.wgsl");
-const RAY_RESULT: Part = part!("common/ray_result.wgsl");
-const KEPT_LOAD: Part = part!("common/kept_load.wgsl");
-const VIEW_RAY: Part = part!("common/view_ray.wgsl");
-const OCCUPANCY: Part = part!("common/occupancy.wgsl");
-const OCCUPANCY_RAISE: Part = part!("common/occupancy_raise.wgsl");
-const MARCH_START: Part = part!("common/march_start.wgsl");
-pub(crate) const EXP: Part = part!("common/exp.wgsl");
-const LOG: Part = part!("common/log.wgsl");
-const SUM: Part = part!("common/sum.wgsl");
-pub(crate) const DENSITY: Part = part!("common/density.wgsl");
-const GRID: Part = part!("common/grid.wgsl");
-const HARMONICS: Part = part!("common/harmonics.wgsl");
-const USABLE: Part = part!("common/usable.wgsl");
-const ADAM: Part = part!("common/adam.wgsl");
-const COUNT_SAMPLES: Part = part!("layer/count_samples.wgsl");
-const COUNT_KEPT: Part = part!("layer/count_kept.wgsl");
+use std::io::Write;
+use std::path::Path;
 
 /// Indices of the dispatch sizes that kernels write.
 pub mod dispatch {
@@ -220,83 +187,24 @@ impl Plan {
         self.config.march.most_steps.div_ceil(32)
     }
 
-    /// A kernel that links `parts` behind the plan's constants.
+    /// A kernel behind the plan's constants, its structs compared with Rust's. The folder that the environment variable
+    /// NERF_DUMP_SHADERS names gets its text.
     ///
     /// # Errors
-    /// As [`Kernel::new`].
-    pub fn kernel(&self, gpu: &Gpu, label: &str, parts: &[Part]) -> Result<Kernel> {
-        self.finish_kernel(gpu, self.source(label, parts), parts)
-    }
-
-    /// As [`Plan::kernel`], with one generated part and constants of its own.
-    ///
-    /// # Errors
-    /// As [`Kernel::new`].
-    pub fn generated_kernel(
-        &self,
-        gpu: &Gpu,
-        label: &str,
-        parts: &[Part],
-        numbers: &[(&str, usize)],
-        text: String,
-    ) -> Result<Kernel> {
-        let mut source = self.source(label, parts).part("generated", text);
-        for (name, value) in numbers {
-            source = source.count(name, *value);
+    /// As [`Kernel::new`], or when that folder cannot be written to.
+    pub fn kernel(&self, gpu: &Gpu, link: &Link) -> Result<Kernel> {
+        let source = self.source(link)?;
+        if let Some(folder) = std::env::var_os("NERF_DUMP_SHADERS") {
+            let path = Path::new(&folder).join(format!("{}.wgsl", link.label().replace(' ', "_")));
+            write_atomically(&path, |file| Ok(file.write_all(source.text().as_bytes())?))?;
         }
-        self.finish_kernel(gpu, source, parts)
-    }
-
-    fn finish_kernel(&self, gpu: &Gpu, source: Source, parts: &[Part]) -> Result<Kernel> {
-        let shared = [
-            (STEP, Step::LAYOUT),
-            (COUNTERS, Counters::LAYOUT),
-            (PROGRESS, Progress::LAYOUT),
-            (RAY_TARGET, RayTarget::LAYOUT),
-            (RAY_RESULT, RayResult::LAYOUT),
-            (CAMERA, Camera::LAYOUT),
-            (GRID, Level::LAYOUT),
-        ];
-        let layouts: Vec<_> =
-            shared.iter().filter(|(part, _)| parts.contains(part)).map(|(_, layout)| *layout).collect();
-        Kernel::new(gpu, &source, &layouts)
+        Kernel::new(gpu, &source, shared::LAYOUTS)
     }
 
     /// A kernel over the rays, bound to what it uses.
-    fn ray_stage(&self, gpu: &Gpu, workspace: &Workspace, label: &str, parts: &[Part]) -> Result<Stage> {
-        let bound = workspace.bind(gpu, &self.kernel(gpu, label, parts)?, &[])?;
+    fn ray_stage(&self, gpu: &Gpu, workspace: &Workspace, link: &Link) -> Result<Stage> {
+        let bound = workspace.bind(gpu, &self.kernel(gpu, link)?, &[])?;
         Ok(Stage::indirect(bound, workspace.get("dispatch"), dispatch::RAYS))
-    }
-
-    /// The text of a kernel, before it is linked. Cameras bring the lenses that the scene needs.
-    #[must_use]
-    pub fn source(&self, label: &str, parts: &[Part]) -> Source {
-        let add = |source: Source, (name, text): &Part| source.part(name, *text);
-        let source = self.constants(Source::new(label).memory(self.memory));
-        let source = parts.iter().fold(source, add);
-        if !parts.contains(&CAMERA) {
-            return source;
-        }
-        let lenses = &self.needs.lenses;
-        lens::parts(lenses).iter().fold(source, add).part("lens choice", lens::choice(lenses))
-    }
-
-    fn stepping(&self) -> &'static [Part] {
-        match self.needs.cascades > 1 {
-            true => &[LOG, part!("stepping/cone.wgsl")],
-            false => &[part!("stepping/uniform.wgsl")],
-        }
-    }
-
-    pub(crate) fn activation(&self) -> Part {
-        if self.needs.hdr { part!("activation/exponential.wgsl") } else { part!("activation/sigmoid.wgsl") }
-    }
-
-    fn background(&self) -> Part {
-        match self.config.background {
-            Background::Random => part!("background/random.wgsl"),
-            _ => part!("background/solid.wgsl"),
-        }
     }
 
     /// Whether colour errors count relative to the colour.
@@ -305,64 +213,6 @@ impl Plan {
         match self.config.loss.color {
             ColorLoss::Auto => self.needs.hdr,
             chosen => chosen == ColorLoss::Relative,
-        }
-    }
-
-    fn loss(&self) -> Part {
-        if self.has_relative_loss() { part!("loss/relative.wgsl") } else { part!("loss/squared.wgsl") }
-    }
-
-    fn depth_loss(&self) -> Part {
-        if self.needs.depth { part!("depth_loss/squared.wgsl") } else { part!("depth_loss/none.wgsl") }
-    }
-
-    /// The distance of a kept sample, where the loss has use for it.
-    fn distance(&self) -> &'static [Part] {
-        match self.needs.depth || self.config.loss.distortion > 0.0 {
-            true => &[RAY, RAY_LOAD, part!("distance/along.wgsl")],
-            false => &[part!("distance/none.wgsl")],
-        }
-    }
-
-    fn distortion(&self) -> Part {
-        match self.config.loss.distortion > 0.0 {
-            true => part!("distortion/pairs.wgsl"),
-            false => part!("distortion/none.wgsl"),
-        }
-    }
-
-    fn sparsity(&self) -> &'static [Part] {
-        match self.config.loss.sparsity > 0.0 {
-            true => &[LOG, part!("sparsity/logarithm.wgsl")],
-            false => &[part!("sparsity/none.wgsl")],
-        }
-    }
-
-    fn depth_target(&self) -> Part {
-        if self.needs.depth { part!("depth_target/stored.wgsl") } else { part!("depth_target/none.wgsl") }
-    }
-
-    fn transmittance(&self) -> Part {
-        match self.config.transmittance {
-            Transmittance::Exclusive => part!("transmittance/exclusive.wgsl"),
-            Transmittance::Inclusive => part!("transmittance/inclusive.wgsl"),
-        }
-    }
-
-    /// The parts that add a gradient, and those that take the sum.
-    fn gradient(&self) -> [Vec<Part>; 2] {
-        let float = part!("gradient/take_float.wgsl");
-        match self.accumulation {
-            Accumulation::Fixed => {
-                let scale = part!("gradient/fixed_scale.wgsl");
-                let take = part!("gradient/take_fixed.wgsl");
-                [vec![scale, part!("gradient/fixed.wgsl")], vec![COUNTERS, USABLE, scale, take]]
-            }
-            Accumulation::Float => [vec![part!("gradient/float.wgsl")], vec![float]],
-            Accumulation::Exchange => [vec![part!("gradient/exchange.wgsl")], vec![float]],
-            Accumulation::Auto | Accumulation::Ordered => {
-                [vec![part!("scatter_ordered.wgsl")], vec![part!("gradient/take_ordered.wgsl")]]
-            }
         }
     }
 }

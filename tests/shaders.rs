@@ -1,7 +1,4 @@
-//! Links and checks every kernel with every variant of its parts, without a GPU.
-//!
-//! No list of kernels here: an entry point names what it needs, and this test looks for the parts that define
-//! it. Where several do, they are the variants of a slot, and every one of them is linked.
+//! Links and checks every kernel with every variant of its parts, as the product links it, without a GPU.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -9,50 +6,28 @@ use std::path::Path;
 use nerf::camera::LensKind;
 use nerf::config::{Accumulation, Config};
 use nerf::gpu::banks::Capacity;
-use nerf::gpu::kernel::{Layout as StructLayout, Shared};
+use nerf::gpu::kernel::Layout as StructLayout;
 use nerf::gpu::source::{Linked, Source};
 use nerf::gpu::tensor::Memory;
 use nerf::kernels::layer::Product;
-use nerf::kernels::training::Tile;
-use nerf::kernels::{Camera, Counters, Needs, Plan, Progress, RayResult, RayTarget, Step, Traits, photos};
-use nerf::model::{Layout, Level};
+use nerf::kernels::link::{self, Link};
+use nerf::kernels::{LAYOUTS, Needs, Plan, Traits, photos};
+use nerf::model::Layout;
 use wgpu::{BindingType, naga};
 
-/// A file of WGSL: its name below `shaders` and its text.
-type File = (String, String);
-
-/// All files of `shaders` and its folders.
-fn files() -> Vec<File> {
-    let root = Path::new("shaders");
-    let list = |folder: &Path| -> Vec<_> {
-        let entries = std::fs::read_dir(folder).expect("a folder of shaders");
-        entries.map(|entry| entry.expect("an entry").path()).collect()
-    };
-    let mut files = Vec::new();
-    for path in list(root) {
-        let found = if path.is_dir() { list(&path) } else { vec![path] };
-        let found = found.into_iter().filter(|path| path.extension().is_some_and(|end| end == "wgsl"));
-        files.extend(found.map(|path| {
-            let name = path.strip_prefix(root).expect("below shaders").display().to_string();
-            (name.replace('\\', "/"), std::fs::read_to_string(path).expect("a shader"))
-        }));
-    }
-    files.sort();
-    files
+/// A file of `shaders/` by its name below it, without the ending.
+fn text(name: &str) -> String {
+    std::fs::read_to_string(Path::new("shaders").join(format!("{name}.wgsl"))).expect("a shader")
 }
 
-/// The choice between the lenses of every set of cameras: a part that the plan writes.
-fn lens_choices() -> Vec<File> {
-    (1..1 << LensKind::ALL.len())
-        .map(|members: u32| {
-            let is_member = |kind: &LensKind| members >> (*kind as u32) & 1 == 1;
-            let kinds: BTreeSet<LensKind> = LensKind::ALL.into_iter().filter(is_member).collect();
-            (format!("lens choice {kinds:?}"), nerf::kernels::lens::choice(&kinds))
-        })
-        .collect()
+/// Every set of lenses.
+fn lens_sets() -> impl Iterator<Item = BTreeSet<LensKind>> {
+    (1..1 << LensKind::ALL.len()).map(|members: u32| {
+        LensKind::ALL.into_iter().filter(|kind| members >> (*kind as u32) & 1 == 1).collect()
+    })
 }
 
-/// What a part defines for others.
+/// What a file defines for others.
 fn definitions(text: &str) -> Vec<String> {
     let name =
         |rest: &str| -> String { rest.chars().take_while(|&c| c.is_alphanumeric() || c == '_').collect() };
@@ -61,13 +36,9 @@ fn definitions(text: &str) -> Vec<String> {
         for keyword in ["fn ", "struct ", "const "] {
             names.extend(line.strip_prefix(keyword).map(name));
         }
-        if let Some((kind, rest)) = line.split_once("> ") {
-            if kind.starts_with("var<") {
-                names.push(name(rest));
-            } else if kind.starts_with("tensor<") {
-                names.extend(["load", "store"].map(|access| format!("{}_{access}", name(rest))));
-            }
-        }
+        names.extend(
+            line.split_once("> ").filter(|(kind, _)| kind.starts_with("var<")).map(|(_, rest)| name(rest)),
+        );
     }
     names
 }
@@ -89,84 +60,69 @@ fn plan(memory: Memory, cascades: u32) -> Plan {
 /// Everything that was linked.
 struct Linker {
     plan: Plan,
-    parts: Vec<File>,
-    /// Which parts define a name.
-    definers: BTreeMap<String, Vec<usize>>,
+    slots: BTreeMap<&'static str, Vec<&'static str>>,
     used: BTreeSet<String>,
     combinations: usize,
     /// Structs that were compared with Rust's.
     compared: BTreeSet<&'static str>,
 }
 
-/// The structs that Rust and WGSL share.
-const SHARED: [StructLayout; 8] = [
-    Step::LAYOUT,
-    Counters::LAYOUT,
-    Progress::LAYOUT,
-    RayTarget::LAYOUT,
-    RayResult::LAYOUT,
-    Camera::LAYOUT,
-    Level::LAYOUT,
-    Tile::LAYOUT,
-];
-
 impl Linker {
     fn new(plan: Plan) -> Self {
-        let mut parts: Vec<File> = files().into_iter().filter(|(name, _)| name.contains('/')).collect();
-        // What reads the photos depends on how many banks they fill.
-        let capacity = Capacity::of(&wgpu::Limits::default(), plan.memory);
-        let photos = |banks| (format!("photos in {banks} banks"), capacity.part(photos::NAME, banks));
-        parts.extend([photos(1), photos(capacity.banks())]);
-        parts.extend(lens_choices());
-        let mut definers: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-        for (index, (_, text)) in parts.iter().enumerate() {
-            for name in definitions(text) {
-                definers.entry(name).or_default().push(index);
-            }
-        }
-        let (used, compared) = (BTreeSet::new(), BTreeSet::new());
-        Self { plan, parts, definers, used, combinations: 0, compared }
+        let slots = link::slots().into_iter().collect();
+        Self { plan, slots, used: BTreeSet::new(), combinations: 0, compared: BTreeSet::new() }
     }
 
-    /// Links `name` with every combination of the variants that it needs; returns how many there are.
+    /// The slots that a text needs, itself or through others, in the order in which they are met.
+    fn slots_of(&self, text_of_main: &str) -> Vec<&'static str> {
+        let (mut slots, mut seen) = (Vec::new(), BTreeSet::new());
+        let mut left: Vec<String> = link::needs(text_of_main).map(str::to_owned).collect();
+        while let Some(name) = left.pop() {
+            if !seen.insert(name.clone()) || name == "lens" || name == photos::NAME {
+                continue;
+            }
+            let files: Vec<String> = match self.slots.get_key_value(name.as_str()) {
+                Some((slot, variants)) => {
+                    slots.push(*slot);
+                    variants.iter().map(|variant| format!("{slot}/{variant}")).collect()
+                }
+                None => vec![format!("common/{name}")],
+            };
+            for file in files {
+                left.extend(link::needs(&text(&file)).map(str::to_owned));
+            }
+        }
+        slots
+    }
+
+    /// Links a kernel with every combination of the variants of its slots; returns how many there are.
     ///
-    /// Variants that clash are passed over where `clashes`: no layer is the first and the last.
-    fn link_all(&mut self, name: &str, text: &str, clashes: bool) -> usize {
-        let source = self.plan.source(name, &[]).part(name, text);
+    /// A combination that the product does not have may not link: a kernel that writes the counters cannot read them as
+    /// a uniform. `fixed` says what is one way only.
+    fn link_all(&mut self, kernel: &Link, main: &str, fixed: &[(&str, &str)]) -> usize {
         let before = self.combinations;
-        self.resolve(source, &mut vec![], clashes);
+        let slots = self.slots_of(main);
+        let kernel = fixed.iter().fold(kernel.clone(), |kernel, (slot, variant)| kernel.with(slot, variant));
+        let open: Vec<_> =
+            slots.into_iter().filter(|slot| fixed.iter().all(|(fixed, _)| fixed != slot)).collect();
+        self.resolve(kernel, &open, &mut fixed.iter().map(|(s, v)| format!("{s}/{v}")).collect());
         self.combinations - before
     }
 
-    fn resolve(&mut self, source: Source, chosen: &mut Vec<usize>, clashes: bool) {
-        let error = match source.link() {
-            Ok(linked) => return self.check(&linked, chosen),
-            Err(error) => format!("{error:#}"),
+    fn resolve(&mut self, kernel: Link, open: &[&'static str], chosen: &mut Vec<String>) {
+        let Some((slot, rest)) = open.split_first() else {
+            let linked = self.plan.source(&kernel).and_then(|source| source.link());
+            return self.check(&linked.unwrap_or_else(|error| panic!("{chosen:?}: {error:#}")), chosen);
         };
-        let names = |chosen: &[usize]| chosen.iter().map(|&i| self.parts[i].0.as_str()).collect::<Vec<_>>();
-        let Some(missing) = error.split_once("no definition in scope for identifier: `") else {
-            assert!(clashes && error.contains("redefinition"), "{:?}: {error}", names(chosen));
-            return;
-        };
-        let missing = missing.1.split('`').next().unwrap_or_default().to_owned();
-        if let Some(definers) = self.definers.get(&missing).cloned() {
-            for part in definers {
-                let (name, text) = self.parts[part].clone();
-                chosen.push(part);
-                self.resolve(source.clone().part(&name, text), chosen, clashes);
-                chosen.pop();
-            }
-        } else {
-            // Constants of one kernel: any number does.
-            let is_constant =
-                missing.chars().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_');
-            assert!(is_constant, "no part defines {missing}, {:?}: {error}", names(chosen));
-            self.resolve(source.constant(&missing, 16), chosen, clashes);
+        for variant in self.slots[slot].clone() {
+            chosen.push(format!("{slot}/{variant}"));
+            self.resolve(kernel.clone().with(slot, variant), rest, chosen);
+            chosen.pop();
         }
     }
 
     /// Every kernel runs on an adapter that has what WebGPU guarantees, and no more.
-    fn check_bindings(&self, linked: &Linked, chosen: &[usize]) {
+    fn check_bindings(linked: &Linked, chosen: &[String]) {
         let limits = wgpu::Limits::default();
         let storage = |kind: &BindingType| {
             matches!(kind, BindingType::Buffer { ty: wgpu::BufferBindingType::Storage { .. }, .. })
@@ -183,29 +139,28 @@ impl Linker {
             ("textures", bindings(linked, texture), limits.max_sampled_textures_per_shader_stage),
         ];
         for (name, count, most) in counts {
-            let parts: Vec<_> = chosen.iter().map(|&part| &self.parts[part].0).collect();
-            assert!(count <= most as usize, "{} with {parts:?} has {count} {name}, of {most}", linked.label);
+            assert!(count <= most as usize, "{} with {chosen:?} has {count} {name}, of {most}", linked.label);
         }
     }
 
-    fn check(&mut self, linked: &Linked, chosen: &[usize]) {
+    fn check(&mut self, linked: &Linked, chosen: &[String]) {
         self.combinations += 1;
-        self.used.extend(chosen.iter().map(|&part| self.parts[part].0.clone()));
+        self.used.extend(chosen.iter().cloned());
         let entry = &linked.module.entry_points;
         assert!(entry.len() == 1 && entry[0].name == "main", "{}", linked.label);
         let names: BTreeSet<&str> = linked.bindings.iter().map(|binding| binding.name.as_str()).collect();
         assert_eq!(names.len(), linked.bindings.len(), "{}: {names:?}", linked.label);
-        self.check_bindings(linked, chosen);
+        Self::check_bindings(linked, chosen);
         let built_in = |argument: &naga::FunctionArgument| {
             argument.binding == Some(naga::Binding::BuiltIn(naga::BuiltIn::NumWorkGroups))
         };
         let main = &entry[0].function;
         assert!(!main.arguments.iter().any(built_in), "{} reads num_workgroups", linked.label);
-        for layout in SHARED {
+        for layout in LAYOUTS {
             let found =
                 linked.module.types.iter().find(|(_, kind)| kind.name.as_deref() == Some(layout.name));
             if let Some((_, kind)) = found {
-                compare(&linked.label, kind, layout);
+                compare(&linked.label, kind, *layout);
                 self.compared.insert(layout.name);
             }
         }
@@ -228,65 +183,136 @@ fn compare(label: &str, kind: &naga::Type, layout: StructLayout) {
     assert_eq!(*span as usize, layout.size, "{label}: {}", layout.name);
 }
 
+/// What of a kernel's slots is one way only: scans and the end of a step write the counters, and a scan knows what.
+fn fixed(file: &str) -> Vec<(&'static str, &'static str)> {
+    match file {
+        "scan" | "finish" | "occupancy_samples" => vec![("counted", "written")],
+        "scatter_ordered" => vec![("counted", "read"), ("gradient_add", "ordered")],
+        _ => vec![("counted", "read")],
+    }
+}
+
 #[test]
 fn every_combination_links() {
     for (memory, cascades) in [(Memory::Buffers, 1), (Memory::Textures, 3)] {
         let mut linker = Linker::new(plan(memory, cascades));
-        for (name, text) in files().iter().filter(|(name, _)| !name.contains('/')) {
-            let count = linker.link_all(name, text, false);
-            println!("{memory:?} {name}: {count}");
-            assert!(count > 0, "{name} does not link");
+        let capacity = Capacity::of(&wgpu::Limits::default(), memory);
+        for file in link::entry_points() {
+            let kernel = Link::of_file(file, file).count("CAPACITY", 16);
+            let main = text(file);
+            let count = match link::needs(&main).any(|needed| needed == "pixels") {
+                // How many banks the photos fill, and which lenses the cameras have.
+                true => [1, capacity.banks()]
+                    .into_iter()
+                    .map(|banks| {
+                        linker.link_all(
+                            &kernel.clone().part(photos::NAME, capacity.part(photos::NAME, banks)),
+                            &main,
+                            &fixed(file),
+                        )
+                    })
+                    .sum(),
+                false => linker.link_all(&kernel, &main, &fixed(file)),
+            };
+            println!("{memory:?} {file}: {count}");
+            assert!(count > 0, "{file} does not link");
         }
         for (width, shared_weights) in [(16, false), (64, true)] {
             let product = Product { rows: 2, shared_weights };
-            let quads = [("INPUT_QUADS", width / 4), ("OUTPUT_QUADS", 4)];
-            for (name, text) in
+            for (name, main) in
                 [("forward", product.forward(width, 16)), ("backward", product.backward(width, width, 16))]
             {
-                let constants = quads.map(|(name, value)| format!("const {name} = {value}u;\n")).concat();
-                let count = linker.link_all(name, &(constants + &text), true);
-                println!("{memory:?} {name} {width}: {count}");
-                assert!(count > 0, "{name} does not link");
+                let kernel = Link::of_text(name, main.clone())
+                    .counts(&[("INPUT_QUADS", width / 4), ("OUTPUT_QUADS", 4)]);
+                // The gradient of colours ends in their own buffer.
+                let layers: &[&[(&str, &str)]] = match name {
+                    "forward" => &[&[]],
+                    _ => &[
+                        &[("layer_gradient", "linear")],
+                        &[("layer_gradient", "color"), ("layer_d_store", "hidden")],
+                    ],
+                };
+                for layer in layers {
+                    let count =
+                        linker.link_all(&kernel, &main, &[layer, [("counted", "read")].as_slice()].concat());
+                    println!("{memory:?} {name} {width}: {count}");
+                    assert!(count > 0, "{name} does not link");
+                }
             }
         }
         for (quads, shared_weights) in [(1, false), (4, false), (1, true), (16, true)] {
-            let product = Product { rows: 2, shared_weights };
-            assert!(linker.link_all("weight gradient", &product.weight_gradient(quads), false) > 0);
+            let main = Product { rows: 2, shared_weights }.weight_gradient(quads);
+            let kernel = Link::of_text("weight gradient", main.clone());
+            assert!(linker.link_all(&kernel, &main, &[("counted", "read")]) > 0);
         }
-        let unused: Vec<_> =
-            linker.parts.iter().map(|(name, _)| name).filter(|name| !linker.used.contains(*name)).collect();
+        let unused: Vec<_> = linker
+            .slots
+            .iter()
+            .flat_map(|(slot, variants)| variants.iter().map(move |variant| format!("{slot}/{variant}")))
+            .filter(|name| !linker.used.contains(name))
+            .collect();
         assert!(unused.is_empty(), "no kernel uses {unused:?}");
-        assert_eq!(linker.compared.len(), SHARED.len(), "compared only {:?}", linker.compared);
+        assert_eq!(linker.compared.len(), LAYOUTS.len(), "compared only {:?}", linker.compared);
         println!("{memory:?}: {} combinations", linker.combinations);
+    }
+}
+
+#[test]
+fn every_set_of_lenses_links() {
+    let mut linker = Linker::new(plan(Memory::Buffers, 1));
+    for lenses in lens_sets() {
+        linker.plan.needs.lenses = lenses;
+        for file in ["view_rays", "view_select"] {
+            linker.link_all(
+                &Link::of_file(file, file),
+                &text(file),
+                &[("counted", "read"), ("transmittance", "exclusive")],
+            );
+        }
+    }
+    assert_eq!(linker.combinations, 2 * 31);
+}
+
+/// A line of needs that names what the file does not use, or that is not there at all, misleads.
+#[test]
+fn files_use_what_they_say_that_they_need() {
+    let slots: BTreeMap<_, _> = link::slots().into_iter().collect();
+    let mut names: Vec<String> = link::entry_points().map(str::to_owned).collect();
+    for (slot, variants) in &slots {
+        names.extend(variants.iter().map(|variant| format!("{slot}/{variant}")));
+    }
+    for name in names {
+        let own = text(&name);
+        let code: String = own.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+        for needed in link::needs(&own).filter(|needed| !["lens", photos::NAME].contains(needed)) {
+            let files: Vec<String> = match slots.get(needed) {
+                Some(variants) => variants.iter().map(|variant| format!("{needed}/{variant}")).collect(),
+                None => vec![format!("common/{needed}")],
+            };
+            let mut defined: Vec<String> = files.iter().flat_map(|file| definitions(&text(file))).collect();
+            if needed == "counters" {
+                defined.push("counters".to_owned());
+            }
+            assert!(defined.iter().any(|word| code.contains(word.as_str())), "{name} does not use {needed}");
+        }
     }
 }
 
 /// A folder is a slot: its files define the same functions, so that each can take another's place.
 #[test]
 fn variants_are_interchangeable() {
-    for slot in [
-        "activation",
-        "background",
-        "depth_loss",
-        "depth_target",
-        "distance",
-        "extent",
-        "loss",
-        "pixels",
-        "position",
-        "stepping",
-        "transmittance",
-        "weights",
-    ] {
+    for (slot, variants) in link::slots() {
         let mut wanted: Option<(String, BTreeSet<String>)> = None;
-        for (name, text) in files().into_iter().filter(|(name, _)| name.starts_with(&format!("{slot}/"))) {
+        for variant in variants {
+            let (name, text) = (format!("{slot}/{variant}"), text(&format!("{slot}/{variant}")));
             let prefix =
                 |line: &str| line.strip_prefix("fn ").map(|rest| rest.split('{').next().map(str::to_owned));
             let signatures: BTreeSet<String> = text.lines().filter_map(prefix).flatten().collect();
             match &wanted {
                 None => wanted = Some((name, signatures)),
                 Some((first, wanted)) => {
-                    assert!(wanted.intersection(&signatures).count() > 0, "{first} and {name} share nothing");
+                    let share = wanted.intersection(&signatures).count() > 0 || wanted.is_empty();
+                    assert!(share, "{first} and {name} share nothing");
                 }
             }
         }
@@ -302,4 +328,17 @@ fn errors_name_the_part_and_its_line() {
         Source::new("test").count("ONE", 1).part("common/broken.wgsl", broken).part("main.wgsl", main);
     let message = format!("{:#}", source.link().expect_err("broken"));
     assert!(message.contains("test") && message.contains("common/broken.wgsl:2"), "{message}");
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let message = |link: &Link| {
+        let error = plan(Memory::Buffers, 1).source(link).expect_err("something is missing");
+        format!("{error:#}")
+    };
+    assert!(message(&Link::of("no such kernel")).contains("'no such kernel'"));
+    let unknown = message(&Link::of_text("probe", "// needs: nothing_known\nfn main() {}\n".to_owned()));
+    assert!(unknown.contains("'probe' needs 'nothing_known'"), "{unknown}");
+    let open = message(&Link::of("kept"));
+    assert!(open.contains("'kept' needs 'packing'") && open.contains("no variant"), "{open}");
 }

@@ -1,4 +1,5 @@
-// Needs: exp. Provides: the colour activation of HDR fields.
+// Provides: the colour activation of HDR fields.
+// needs: exp
 
 const LOG_COLOR_MOST = 11.5;
 

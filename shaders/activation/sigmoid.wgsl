@@ -1,4 +1,5 @@
-// Needs: exp. Provides: the colour activation of LDR fields.
+// Provides: the colour activation of LDR fields.
+// needs: exp
 
 fn color_activation(raw: vec3<f32>) -> vec3<f32> {
     let e = vec3(exp_accurate(-abs(raw.x)), exp_accurate(-abs(raw.y)), exp_accurate(-abs(raw.z)));

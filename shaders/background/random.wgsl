@@ -1,4 +1,5 @@
-// Needs: random_f32. Provides: background_color, a colour drawn per ray and step.
+// Provides: background_color, a colour drawn per ray and step.
+// needs: random
 
 fn background_color(stream: u32, ray: u32) -> vec3<f32> {
     return vec3(

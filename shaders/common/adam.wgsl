@@ -1,4 +1,5 @@
-// Needs: step. Provides: Adam's update (Kingma & Ba 2015); see `reference::adam`.
+// Provides: Adam's update (Kingma & Ba 2015); see `reference::adam`.
+// needs: step
 
 struct Adam {
     parameter: vec4<f32>,

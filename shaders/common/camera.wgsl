@@ -1,4 +1,5 @@
-// Needs: lens_ray, ray_through_box. Provides: camera_ray, and depth along the view axis and along a ray.
+// Provides: camera_ray, and depth along the view axis and along a ray.
+// needs: lens, ray
 
 struct Camera {
     // Position and axes in box space; `back` points away from the view.

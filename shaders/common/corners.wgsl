@@ -1,5 +1,5 @@
 // Provides: gradient_scatter, which adds a sample's gradient of a level to the eight corners of its cell.
-// Needs: grid, gradient_add.
+// needs: gradient_add, grid
 
 fn gradient_scatter(position: vec3<f32>, level: Level, gradient: vec2<f32>) {
     let cell = grid_cell(position, level);

@@ -1,4 +1,5 @@
 // Provides: what is counted on the device during a step, and the sizes of its dispatches.
+// needs: counted
 
 struct Counters {
     // Rays generated for this step; the last kernel of the step writes the next number.

@@ -1,4 +1,5 @@
-// Needs: random, step, ray, stepping. Provides: march_start.
+// Provides: march_start.
+// needs: jitter, random, ray, step, stepping
 
 // Where the first sample of a ray lies, in steps: one random offset for the whole ray while training, and
 // half a step when JITTER is off.

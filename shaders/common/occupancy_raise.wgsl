@@ -1,5 +1,6 @@
-// Needs: exp. Provides: occupancy_raise, which raises a cell of the occupancy grid to what the network says in it, as the
-// optical depth of one smallest step; see `reference::occupancy`.
+// Provides: occupancy_raise, which raises a cell of the occupancy grid to what the network says in it, as the optical
+// depth of one smallest step; see `reference::occupancy`.
+// needs: exp
 
 // Bits of floats: those of numbers from 0 on have the same order as the numbers, and cells that can hold nothing have -1,
 // which is beyond all.

@@ -1,4 +1,5 @@
-// Needs: ray. Provides: the rays of this step.
+// Provides: the rays of this step.
+// needs: ray
 
 // Two for each ray: origin and t_near, direction and t_far.
 tensor<read> ray_lines: vec4<f32>;

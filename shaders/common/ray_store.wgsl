@@ -1,4 +1,5 @@
-// Needs: ray. Provides: where the rays of this step go.
+// Provides: where the rays of this step go.
+// needs: ray
 
 // Two for each ray: origin and t_near, direction and t_far.
 tensor<write> ray_lines: vec4<f32>;

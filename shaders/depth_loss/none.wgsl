@@ -1,4 +1,4 @@
-// Needs: Passage. Provides: the depth's share of the loss where it has none.
+// Provides: the depth's share of the loss where it has none.
 
 struct DepthRay {
     unused: u32,

@@ -1,6 +1,7 @@
-// Needs: counters, sum, transmittance, behind_next, kept_load. Provides: the depth's share of the loss, DEPTH_WEIGHT / M
-// times the square of sum_i w_i (t_i - g) over the rays whose distance g is known. It is a fifth channel whose colour is
-// t_i - g, over 0: what is transparent is left to the other channels. Distances are in sides of the inner cube.
+// Provides: the depth's share of the loss, DEPTH_WEIGHT / M times the square of sum_i w_i (t_i - g) over the rays whose
+// distance g is known. It is a fifth channel whose colour is t_i - g, over 0: what is transparent is left to the other
+// channels. Distances are in sides of the inner cube.
+// needs: counters, exp, kept_load, sum, transmittance
 
 struct DepthRay {
     // 0 where unknown.

@@ -1,4 +1,4 @@
-// Needs: Passage. Provides: the distortion's share of the loss where it has none.
+// Provides: the distortion's share of the loss where it has none.
 
 struct SpreadRay {
     unused: u32,

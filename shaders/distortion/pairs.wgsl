@@ -1,7 +1,7 @@
-// Needs: counters, sum, transmittance, behind_next, kept_load. Provides: the distortion's share of the loss (Barron et
-// al. 2022, eq. 15), DISTORTION / M times sum_ij w_i w_j |x_i - x_j| + 1/3 sum_i w_i^2 dx_i: it pulls the weights of a ray
-// together. x = t / (1 + t), with t in sides of the inner cube. Its slope by w_i is the colour of a further channel over
-// 0. See `reference::loss`.
+// Provides: the distortion's share of the loss (Barron et al. 2022, eq. 15), DISTORTION / M times sum_ij w_i w_j |x_i -
+// x_j| + 1/3 sum_i w_i^2 dx_i: it pulls the weights of a ray together. x = t / (1 + t), with t in sides of the inner
+// cube. Its slope by w_i is the colour of a further channel over 0. See `reference::loss`.
+// needs: counters, kept_load, sum, transmittance
 
 struct SpreadRay {
     // Sums of w and of w x: on the way there of the samples so far, on the way back of those behind.

@@ -1,6 +1,6 @@
 // Provides: the steps of a ray that are marched at once: those of a round, from where the round before ended up to
-// `progress.quota` samples. A ray whose next step is MAX_STEPS has none left. Needs: progress,
-// view_ray.
+// `progress.quota` samples. A ray whose next step is MAX_STEPS has none left.
+// needs: progress, view_ray
 
 var<uniform> progress: Progress;
 var<storage, read_write> view_rays: array<ViewRay>;

@@ -1,4 +1,5 @@
-// Provides: the ray at a longitude and latitude in radians. Needs: sine.
+// Provides: the ray at a longitude and latitude in radians.
+// needs: camera, sine
 
 const PI = 3.14159265;
 

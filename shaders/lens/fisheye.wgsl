@@ -1,5 +1,6 @@
 // Provides: the ray of OpenCV's fisheye, by Newton's method between the axis and the rim, where bisection takes over
-// when a step would leave what is left between them. Needs: sine.
+// when a step would leave what is left between them.
+// needs: camera, sine
 
 const FISHEYE_STEPS = 40;
 

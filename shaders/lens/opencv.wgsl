@@ -1,6 +1,7 @@
 // Provides: the ray of OpenCV's radial-tangential model. The undistorted point is followed from the axis outwards, in
 // one stride for ordinary lenses and in shorter ones near a fold: Newton's method from the far end alone may land
 // on a branch beyond the fold.
+// needs: camera
 
 const OPENCV_STRIDES = 40;
 const OPENCV_STEPS = 10;

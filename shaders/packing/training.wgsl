@@ -1,4 +1,5 @@
-// Needs: density, distance. Provides: pack, what compositing needs of a chosen sample while training.
+// Provides: pack, what compositing needs of a chosen sample while training.
+// needs: density, distance
 
 tensor<read> samples: vec4<f32>;
 tensor<read> density_out: vec4<f32>;

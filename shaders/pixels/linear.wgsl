@@ -1,4 +1,5 @@
-// Needs: photos_word. Provides: photo_color for float photos (scene-linear, premultiplied).
+// Provides: photo_color for float photos (scene-linear, premultiplied).
+// needs: photos
 
 // Colour premultiplied by alpha, and alpha.
 fn photo_color(first_row: u32, drawn: u32) -> vec4<f32> {

@@ -1,4 +1,5 @@
-// Needs: photos_word. Provides: photo_color for 8-bit photos (straight alpha, kept in their display-referred values).
+// Provides: photo_color for 8-bit photos (straight alpha, kept in their display-referred values).
+// needs: photos
 
 // Colour premultiplied by alpha, and alpha.
 fn photo_color(first_row: u32, drawn: u32) -> vec4<f32> {

@@ -1,4 +1,5 @@
-// Needs: photos_word. Provides: photo_color for 8-bit photos without alpha (kept in their display-referred values).
+// Provides: photo_color for 8-bit photos without alpha (kept in their display-referred values).
+// needs: photos
 
 // Colour, and alpha 1.
 fn photo_color(first_row: u32, drawn: u32) -> vec4<f32> {

@@ -1,6 +1,7 @@
-// Needs: counters, exp, log, kept_load. Provides: the sparsity's share of the loss, SPARSITY / M times the sum of
-// (1 - T) d ln(1 + sigma / sigma_0): what is hidden by what lies in front of it need not be there. 1 - T is a constant as
-// far as gradients go. A kept sample stands for as many as it has gain. See `reference::loss`.
+// Provides: the sparsity's share of the loss, SPARSITY / M times the sum of (1 - T) d ln(1 + sigma / sigma_0): what is
+// hidden by what lies in front of it need not be there. 1 - T is a constant as far as gradients go. A kept sample
+// stands for as many as it has gain. See `reference::loss`.
+// needs: counters, exp, kept_load, log
 
 // What of it a sample has, but for the function of its density.
 fn sparsity_part(i: u32, root: f32, gain: f32) -> f32 {

@@ -1,5 +1,6 @@
-// Needs: counters, log. Provides: steps that grow with the distance, between STEP_MIN and STEP_MAX, all of them times the scale;
-// see `reference::march`.
+// Provides: steps that grow with the distance, between STEP_MIN and STEP_MAX, all of them times the scale; see
+// `reference::march`.
+// needs: counters, log
 
 const STEPPING_LINEAR_END = STEP_MIN / CONE;
 const STEPPING_CONE_END = STEP_MAX / CONE;

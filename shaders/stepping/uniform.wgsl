@@ -1,4 +1,5 @@
-// Needs: counters. Provides: equal steps along the ray; see `reference::march`.
+// Provides: equal steps along the ray; see `reference::march`.
+// needs: counters
 
 fn stepping_index(t: f32) -> f32 {
     return t / stepping_length(0.0);

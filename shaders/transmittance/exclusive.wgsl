@@ -1,4 +1,5 @@
 // Provides: the exclusive sum. T_i holds what lies before sample i.
+// needs: sum
 
 // What T_i holds, from the optical depth before the sample and its own.
 fn transmittance_depth(before: f32, tau: f32) -> f32 {

@@ -1,4 +1,5 @@
 // Provides: the inclusive sum, as the derivation prints it. T_i holds sample i itself.
+// needs: exp, sum
 
 // What T_i holds, from the optical depth before the sample and its own.
 fn transmittance_depth(before: f32, tau: f32) -> f32 {

@@ -2,7 +2,6 @@
 
 use super::probe::Probe;
 use super::{Subject, Tally};
-use crate::kernels::{DENSITY, EXP, Part, part};
 use crate::reference::ColorRange;
 use crate::reference::activation::{
     MAX_LOG_COLOR, MAX_LOG_DENSITY, color, color_backward, log_density, log_density_backward,
@@ -15,19 +14,20 @@ use anyhow::Result;
 /// When the device was lost or refuses the kernel.
 pub fn activations(subject: &Subject) -> Result<Tally> {
     let mut tally = Tally::new("activations", 5e-7, "eight roundings: e^x, sum, quotient, product");
-    compare(subject, &mut tally, ColorRange::Ldr, part!("activation/sigmoid.wgsl"))?;
-    compare(subject, &mut tally, ColorRange::Hdr, part!("activation/exponential.wgsl"))?;
+    compare(subject, &mut tally, ColorRange::Ldr, "sigmoid")?;
+    compare(subject, &mut tally, ColorRange::Hdr, "exponential")?;
     Ok(tally)
 }
 
-fn compare(subject: &Subject, tally: &mut Tally, range: ColorRange, activation: Part) -> Result<()> {
+fn compare(subject: &Subject, tally: &mut Tally, range: ColorRange, activation: &str) -> Result<()> {
     let body = "let raw = input(0u).x;\n\
                 let gradient = input(0u).y;\n\
                 let color = color_activation(vec3(raw)).x;\n\
                 let d_color = color_activation_backward(vec3(color), vec3(gradient)).x;\n\
                 output(0u, vec4(color, d_color, density_log(raw), density_log_backward(raw, gradient)));";
     let inputs = inputs();
-    let outputs = Probe { parts: &[EXP, DENSITY, activation], body }.evaluate::<1, 1>(subject, &inputs)?;
+    let outputs = Probe { needs: "activation, density", variants: &[("activation", activation)], body }
+        .evaluate::<1, 1>(subject, &inputs)?;
     for ([[raw, gradient, ..]], [got]) in inputs.into_iter().zip(outputs) {
         let (raw, gradient, got) = (f64::from(raw), f64::from(gradient), got.map(f64::from));
         let case = |what: &str| format!("{range:?}: {what} at {raw:e}");

@@ -2,7 +2,6 @@
 
 use super::probe::Probe;
 use super::{Subject, Tally};
-use crate::kernels::EXP;
 use crate::reference::composite::{opacity, optical_depth};
 use anyhow::Result;
 
@@ -16,7 +15,7 @@ pub fn exponentials(subject: &Subject) -> Result<Tally> {
     let inputs = inputs();
     let body = "let x = input(0u);\n\
                 output(0u, vec4(exp_accurate(x.x), opacity(x.y), optical_depth(x.z, x.w), 0.0));";
-    let outputs = Probe { parts: &[EXP], body }.evaluate::<1, 1>(subject, &inputs)?;
+    let outputs = Probe { needs: "exp", variants: &[], body }.evaluate::<1, 1>(subject, &inputs)?;
     for ([input], [got]) in inputs.iter().zip(&outputs) {
         let [x, tau, s, delta] = input.map(f64::from);
         let [exp, alpha, depth] = [got[0], got[1], got[2]].map(f64::from);

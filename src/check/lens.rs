@@ -4,7 +4,6 @@ use super::draw::Random;
 use super::probe::Probe;
 use super::{Subject, Tally};
 use crate::camera::Lens;
-use crate::kernels::{CAMERA, RAY, SINE};
 use crate::reference::lens::{self, Distortion, Fisheye};
 use anyhow::Result;
 use glam::{DVec2, DVec3};
@@ -26,7 +25,7 @@ fn points_and_slopes(subject: &Subject) -> Result<Tally> {
                 output(1u, vec4(at.d_y, fisheye_bend(abs(input(0u).x), input(1u))));";
     let mut random = Random::new(44);
     let inputs: Vec<_> = (0..4000).map(|_| input(&mut random)).collect();
-    let outputs = Probe { parts: &[CAMERA, RAY], body }.evaluate::<2, 2>(subject, &inputs)?;
+    let outputs = Probe { needs: "camera", variants: &[], body }.evaluate::<2, 2>(subject, &inputs)?;
     for (input, [first, second]) in inputs.iter().zip(outputs) {
         let [[x, y, p1, p2], k] = input.map(|row| row.map(f64::from));
         let (lens, point) = (Distortion { k, p: [p1, p2] }, DVec2::new(x, y));
@@ -84,7 +83,7 @@ fn undistorted_points(subject: &Subject) -> Result<Tally> {
                 output(0u, vec4(seen.direction, select(0.0, 1.0, seen.exists)));";
     for lens in LENSES {
         let (focal_px, inputs) = image_of(lens);
-        let outputs = Probe { parts: &[CAMERA, RAY], body }.evaluate::<3, 1>(subject, &inputs)?;
+        let outputs = Probe { needs: "camera", variants: &[], body }.evaluate::<3, 1>(subject, &inputs)?;
         let mut seen = 0;
         for (input, [[x, y, z, exists]]) in inputs.iter().zip(outputs) {
             let plane = vector([input[0][0], input[0][1]]);
@@ -151,7 +150,7 @@ fn sines(subject: &Subject) -> Result<Tally> {
     let body = "output(0u, vec4(sine_cosine(input(0u).x), sine_cosine(input(0u).y)));";
     let angle = |i: i32| (4.0 * f64::from(i) / 10_000.0) as f32;
     let inputs: Vec<_> = (0..=10_000).map(|i| [[angle(i), -angle(i), 0.0, 0.0]]).collect();
-    let outputs = Probe { parts: &[SINE], body }.evaluate::<1, 1>(subject, &inputs)?;
+    let outputs = Probe { needs: "sine", variants: &[], body }.evaluate::<1, 1>(subject, &inputs)?;
     for ([input], [got]) in inputs.iter().zip(&outputs) {
         let (sine, cosine) = f64::from(input[0]).sin_cos();
         tally.each(&format!("{}", input[0]), got, &[sine, cosine, -sine, cosine], |_| 1.0);

@@ -3,13 +3,15 @@
 use super::{Setup, Subject};
 use crate::camera::LensKind;
 use crate::gpu::pass::Stage;
-use crate::kernels::{Part, Workspace};
+use crate::kernels::{Link, Workspace};
 use anyhow::Result;
 
-/// Functions of `parts` at many inputs.
+/// Functions of a few parts at many inputs.
 pub(super) struct Probe<'a> {
-    /// Where the functions are.
-    pub(super) parts: &'a [Part],
+    /// What the body needs, as a shader says it.
+    pub(super) needs: &'a str,
+    /// Variants of slots that are not the plan's.
+    pub(super) variants: &'a [(&'a str, &'a str)],
     /// WGSL that reads `input(0u)` up to `input(INPUTS - 1)` and calls `output(i, value)`, each a `vec4<f32>`.
     pub(super) body: &'a str,
 }
@@ -27,7 +29,8 @@ impl Probe<'_> {
         let plan = subject.setup(setup).plan(gpu)?;
         let cases = inputs.len();
         let text = format!(
-            "var<storage, read> probe_inputs: array<vec4<f32>>;\n\
+            "// needs: {}\n\
+             var<storage, read> probe_inputs: array<vec4<f32>>;\n\
              var<storage, read_write> probe_outputs: array<vec4<f32>>;\n\
              var<private> probe_case: u32;\n\
              fn input(i: u32) -> vec4<f32> {{ return probe_inputs[probe_case * {INPUTS}u + i]; }}\n\
@@ -38,12 +41,14 @@ impl Probe<'_> {
                  probe_case = id.x;\n\
                  {}\n\
              }}\n",
-            self.body
+            self.needs, self.body
         );
         let mut workspace = Workspace::default();
         workspace.add(gpu.storage_with("probe_inputs", inputs.as_flattened())?);
         workspace.add(gpu.storage::<[f32; 4]>("probe_outputs", cases * OUTPUTS)?);
-        let kernel = plan.generated_kernel(gpu, "probe", self.parts, &[], text)?;
+        let link = Link::of_text("probe", text);
+        let link = self.variants.iter().fold(link, |link, (slot, variant)| link.with(slot, variant));
+        let kernel = plan.kernel(gpu, &link)?;
         let bound = workspace.bind(gpu, &kernel, &[])?;
         gpu.run("check", [&Stage::fixed(bound, cases.div_ceil(64), 1)], None);
         let outputs: Vec<[f32; 4]> = workspace.read(gpu, "probe_outputs", cases * OUTPUTS)?;

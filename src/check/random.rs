@@ -3,7 +3,6 @@
 use super::draw::{SEED, STEP, quiet_step};
 use super::probe::Probe;
 use super::{Subject, Tally};
-use crate::kernels::RANDOM;
 use crate::reference::random::{pcg, random_u32, uniform};
 use anyhow::Result;
 
@@ -25,7 +24,7 @@ pub fn random_numbers(subject: &Subject) -> Result<Tally> {
         stream = quiet_step().stream
     );
     let inputs: Vec<_> = (0..COUNT).map(|i| [[i as f32, 0.0, 0.0, 0.0]]).collect();
-    let outputs = Probe { parts: &[RANDOM], body: &body }.evaluate::<1, 2>(subject, &inputs)?;
+    let outputs = Probe { needs: "random", variants: &[], body: &body }.evaluate::<1, 2>(subject, &inputs)?;
     for (i, [halves, [float, ..]]) in outputs.into_iter().enumerate() {
         let index = i as u32;
         let mixed = pcg(index.wrapping_mul(1_048_573));

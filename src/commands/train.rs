@@ -79,7 +79,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         "step": setup.about.step,
         "adapter": setup.about.adapter,
         "driver": format!("{} {}", gpu.info.driver, gpu.info.driver_info),
-        "left_out": needs::left_out(&setup.plan.needs, &setup.about.config),
+        "left_out": setup.plan.left_out(),
         "load_seconds": load_seconds,
         "compile_seconds": compile_seconds,
     }))?;

@@ -2,10 +2,7 @@
 
 use super::density::{forward, layer_stage};
 use super::marching::{SPARE_ROWS, Scanned, kept_capacity, scan};
-use super::{
-    COUNT_KEPT, COUNTERS, DENSITY, EXP, HARMONICS, OCCUPANCY, OCCUPANCY_RAISE, Plan, RANDOM, RAY, RAY_LOAD,
-    STEP, Workspace, dispatch, viewing,
-};
+use super::{Link, Plan, Workspace, dispatch, viewing};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::{Size, Stage};
@@ -44,26 +41,15 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
     let (select, packing) = match selection {
-        Selection::Training => {
-            let packing = [&[DENSITY], plan.distance(), &[part!("packing/training.wgsl")]].concat();
-            (select(gpu, plan, workspace)?, packing)
-        }
-        Selection::View => (viewing::select(gpu, plan, workspace)?, vec![part!("packing/view.wgsl")]),
+        Selection::Training => (plan.ray_stage(gpu, workspace, &Link::of("select"))?, "training"),
+        Selection::View => (viewing::select(gpu, plan, workspace)?, "view"),
     };
-    let kept = [&[COUNTERS], packing.as_slice(), &[part!("kept.wgsl")]].concat();
-    let kept = plan.ray_stage(gpu, workspace, "kept", &kept)?;
-    let parts = [COUNTERS, RAY, RAY_LOAD, HARMONICS, part!("color_input.wgsl")];
-    let input = plan.kernel(gpu, "color input", &parts)?;
+    let kept = plan.ray_stage(gpu, workspace, &Link::of("kept").with("packing", packing))?;
+    let input = plan.kernel(gpu, &Link::of("color input"))?;
     let input = Stage::indirect(workspace.bind(gpu, &input, &[])?, workspace.get("dispatch"), dispatch::KEPT);
     let mut stages = vec![select, scan(gpu, plan, workspace, Scanned::Kept)?, kept, input];
     stages.extend(network(gpu, plan, workspace)?);
     Ok(stages)
-}
-
-/// Chooses the samples of a training.
-fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [RANDOM, STEP, COUNTERS, EXP, DENSITY, OCCUPANCY, OCCUPANCY_RAISE, part!("select.wgsl")];
-    plan.ray_stage(gpu, workspace, "select", &parts)
 }
 
 /// The colour network's layers.
@@ -74,15 +60,10 @@ fn network(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> 
     let mut stages = Vec::new();
     for (number, layer) in layers.iter().enumerate() {
         let label = format!("color {number}");
-        let input = part!("layer/input.wgsl");
         let size = Size::Indirect(workspace.get("dispatch").clone(), dispatch::KEPT_TILES);
-        let (parts, output) = if number == last {
-            let store = part!("layer/store_color.wgsl");
-            (vec![COUNTERS, COUNT_KEPT, EXP, plan.activation(), input, store], "color")
-        } else {
-            (vec![COUNTERS, COUNT_KEPT, input, part!("layer/store_hidden.wgsl")], COLOR_HIDDEN[number])
-        };
-        let kernel = forward(gpu, plan, &label, layer, &parts)?;
+        let (store, output) =
+            if number == last { ("color", "color") } else { ("hidden", COLOR_HIDDEN[number]) };
+        let kernel = forward(gpu, plan, &label, layer, ["kept", store])?;
         let renamed = [("layer_input", source), ("layer_output", output)];
         stages.push(layer_stage(gpu, workspace, &kernel, layer, &renamed, size)?);
         source = output;

@@ -1,7 +1,7 @@
 //! The density network over all marched samples: encoding and two layers.
 
 use super::marching::SPARE_ROWS;
-use super::{COUNT_SAMPLES, COUNTERS, GRID, Plan, Workspace, dispatch};
+use super::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::demand::Demand;
@@ -47,10 +47,10 @@ pub fn allocate_parameters(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) ->
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
-    let encode = plan.kernel(gpu, "encode", &[COUNTERS, GRID, part!("encode.wgsl")])?;
+    let encode = plan.kernel(gpu, &Link::of("encode"))?;
     let sizes = workspace.get("dispatch");
-    let hidden = forward(gpu, plan, "density hidden", &plan.layout.density[0], &FORWARD_HIDDEN)?;
-    let out = forward(gpu, plan, "density out", &plan.layout.density[1], &FORWARD_LINEAR)?;
+    let hidden = forward(gpu, plan, "density hidden", &plan.layout.density[0], ["samples", "hidden"])?;
+    let out = forward(gpu, plan, "density out", &plan.layout.density[1], ["samples", "linear"])?;
     let tiles = Size::Indirect(sizes.clone(), dispatch::SAMPLE_TILES);
     Ok(vec![
         Stage::indirect(workspace.bind(gpu, &encode, &[])?, sizes, dispatch::ENCODE),
@@ -73,18 +73,19 @@ pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage
     ])
 }
 
-const FORWARD_HIDDEN: [super::Part; 4] =
-    [COUNTERS, COUNT_SAMPLES, part!("layer/input.wgsl"), part!("layer/store_hidden.wgsl")];
-const FORWARD_LINEAR: [super::Part; 4] =
-    [COUNTERS, COUNT_SAMPLES, part!("layer/input.wgsl"), part!("layer/store_linear.wgsl")];
-
-/// The kernel of a forward layer.
+/// The kernel of a forward layer: which rows it runs over, and where its outputs go.
 ///
 /// # Errors
 /// When it cannot be built.
-pub fn forward(gpu: &Gpu, plan: &Plan, label: &str, layer: &Layer, parts: &[super::Part]) -> Result<Kernel> {
-    let text = plan.product.forward(layer.inputs, layer.outputs);
-    plan.generated_kernel(gpu, label, parts, &quads(layer), text)
+pub fn forward(
+    gpu: &Gpu,
+    plan: &Plan,
+    label: &str,
+    layer: &Layer,
+    [rows, store]: [&str; 2],
+) -> Result<Kernel> {
+    let link = Link::of_text(label, plan.product.forward(layer.inputs, layer.outputs));
+    plan.kernel(gpu, &link.with("layer_count", rows).with("layer_store", store).counts(&quads(layer)))
 }
 
 /// The constants of a layer's shape.

@@ -1,6 +1,6 @@
 //! The matrix products of the networks, the one part of the kernels that is generated: software drivers are
 //! several times faster when a layer's inputs stay in registers, which takes one line per multiplication.
-//! Where the inputs come from and the outputs go is WGSL in `shaders/layer`.
+//! Where the inputs come from and the outputs go is WGSL in `shaders/layer_…` and `shaders/common`.
 //!
 //! Every product handles several samples per thread, since reading a weight costs as much as several
 //! multiplications. Rows behind the last are computed too; all buffers have room for them.
@@ -32,7 +32,7 @@ impl Product {
     /// [`crate::model::Layer`].
     #[must_use]
     pub fn forward(self, inputs: usize, outputs: usize) -> String {
-        let mut text = self.head(inputs * outputs / 4);
+        let mut text = self.head("layer_load, layer_store", inputs * outputs / 4);
         for row in 0..self.rows {
             for quad in 0..inputs / 4 {
                 line!(text, "    let x{row}_{quad} = layer_load(first + {row}u, {quad}u);");
@@ -59,7 +59,7 @@ impl Product {
     /// `layer_d_store(row, k, Σ_o W[o][k] d[o])` for the first `wanted` inputs.
     #[must_use]
     pub fn backward(self, inputs: usize, wanted: usize, outputs: usize) -> String {
-        let mut text = self.head(inputs * outputs / 4);
+        let mut text = self.head("layer_d_store, layer_gradient", inputs * outputs / 4);
         let quads = outputs / 4;
         for row in 0..self.rows {
             for quad in 0..quads {
@@ -108,7 +108,7 @@ impl Product {
     }
 
     /// All threads of a workgroup go on or none: subgroups need all their members.
-    fn head(self, weights: usize) -> String {
+    fn head(self, needs: &str, weights: usize) -> String {
         let rows = self.rows;
         let (argument, lane) = if self.shared_weights {
             (", @builtin(subgroup_invocation_id) invocation: u32", "    let lane = invocation % 8u;\n")
@@ -116,7 +116,8 @@ impl Product {
             ("", "")
         };
         format!(
-            "var<uniform> layer_weights: array<vec4<f32>, {weights}>;\n\
+            "// needs: layer_count, {needs}\n\
+             var<uniform> layer_weights: array<vec4<f32>, {weights}>;\n\
              @compute @workgroup_size(64)\n\
              fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>{argument}) {{\n    \
                  let first = id.x * {rows}u;\n    \
@@ -221,6 +222,7 @@ fn store_sums(text: &mut String, inputs: usize, quads: usize) {
 const COMPONENTS: [&str; 4] = ["x", "y", "z", "w"];
 
 const TILE_HEAD: &str = "\
+// needs: layer_count, tile
 @compute @workgroup_size(8)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let chunk = id.x % CHUNKS;
@@ -237,6 +239,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 ";
 
 const SHARED_TILE_HEAD: &str = "\
+// needs: layer_count, tile
 @compute @workgroup_size(8)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,

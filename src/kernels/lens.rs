@@ -1,34 +1,29 @@
 //! Which lenses a kernel links: those that its cameras have, behind one name.
 
-use super::{Part, SINE};
 use crate::camera::LensKind;
 use std::collections::BTreeSet;
 
-/// The part of a lens, and the prefix of its functions.
-fn model(kind: LensKind) -> (Part, &'static str) {
+/// The file of a lens, and the prefix of its functions.
+pub(super) fn file(kind: LensKind) -> &'static str {
     match kind {
-        LensKind::Pinhole => (part!("lens/pinhole.wgsl"), "pinhole"),
-        LensKind::OpenCv => (part!("lens/opencv.wgsl"), "opencv"),
-        LensKind::Fisheye => (part!("lens/fisheye.wgsl"), "fisheye"),
-        LensKind::Orthographic => (part!("lens/orthographic.wgsl"), "orthographic"),
-        LensKind::Equirectangular => (part!("lens/equirectangular.wgsl"), "equirectangular"),
+        LensKind::Pinhole => "pinhole",
+        LensKind::OpenCv => "opencv",
+        LensKind::Fisheye => "fisheye",
+        LensKind::Orthographic => "orthographic",
+        LensKind::Equirectangular => "equirectangular",
     }
 }
 
-/// The parts of `kinds` and what they need.
-pub(super) fn parts(kinds: &BTreeSet<LensKind>) -> Vec<Part> {
-    let mut parts: Vec<Part> = kinds.iter().map(|&kind| model(kind).0).collect();
-    if kinds.contains(&LensKind::Fisheye) || kinds.contains(&LensKind::Equirectangular) {
-        parts.push(SINE);
-    }
-    parts
+/// Names of the lenses that no camera has.
+pub(super) fn absent(kinds: &BTreeSet<LensKind>) -> impl Iterator<Item = &'static str> {
+    LensKind::ALL.into_iter().filter(|kind| !kinds.contains(kind)).map(LensKind::name)
 }
 
 /// WGSL of `lens_ray` and `lens_depth` for cameras with lenses of `kinds`, at least one: a call where there is one
 /// kind, a choice by the camera's lens where there are several.
 #[must_use]
 pub fn choice(kinds: &BTreeSet<LensKind>) -> String {
-    let ray = |kind| format!("{}_ray(camera, plane)", model(kind).1);
+    let ray = |kind| format!("{}_ray(camera, plane)", file(kind));
     let depth = |kind: LensKind| {
         let along = if kind.depth_is_distance() { "ray" } else { "axis" };
         format!("depth_along_{along}(camera, toward)")

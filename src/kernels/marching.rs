@@ -1,9 +1,6 @@
 //! From rays to samples: marching through the occupancy grid, and the scan that packs the samples.
 
-use super::{
-    COUNTERS, Counters, MARCH_START, OCCUPANCY, PROGRESS, Part, Plan, RANDOM, RAY, RAY_LOAD, STEP, Step,
-    VIEW_RAY, Workspace, dispatch,
-};
+use super::{Counters, Link, Plan, Step, Workspace, dispatch};
 use crate::config::Batch;
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
@@ -40,12 +37,10 @@ pub enum Extent {
 }
 
 impl Extent {
-    fn parts(self) -> &'static [Part] {
-        const WHOLE: &[Part] = &[part!("extent/whole.wgsl")];
-        const ROUND: &[Part] = &[PROGRESS, VIEW_RAY, part!("extent/round.wgsl")];
+    fn variant(self) -> &'static str {
         match self {
-            Self::Whole => WHOLE,
-            Self::Round => ROUND,
+            Self::Whole => "whole",
+            Self::Round => "round",
         }
     }
 }
@@ -69,13 +64,11 @@ pub fn stages_over(
     jitter: bool,
     extent: Extent,
 ) -> Result<Vec<Stage>> {
-    let jitter = if jitter { part!("common/jitter_on.wgsl") } else { part!("common/jitter_off.wgsl") };
-    let common =
-        [&[RANDOM, STEP, COUNTERS, RAY, RAY_LOAD, MARCH_START, jitter], plan.stepping(), extent.parts()];
-    let march = [&[OCCUPANCY], common.concat().as_slice(), &[part!("march.wgsl")]].concat();
-    let march = plan.kernel(gpu, "march", &march)?;
-    let samples = [common.concat().as_slice(), &[part!("samples.wgsl")]].concat();
-    let samples = plan.kernel(gpu, "samples", &samples)?;
+    let jitter = if jitter { "on" } else { "off" };
+    let kernel = |label: &str| {
+        plan.kernel(gpu, &Link::of(label).with("jitter", jitter).with("extent", extent.variant()))
+    };
+    let (march, samples) = (kernel("march")?, kernel("samples")?);
     let sizes = workspace.get("dispatch");
     Ok(vec![
         Stage::indirect(workspace.bind(gpu, &march, &[])?, sizes, dispatch::RAYS),
@@ -101,16 +94,14 @@ pub enum Scanned {
 /// When the kernel cannot be built.
 pub fn scan(gpu: &Gpu, plan: &Plan, workspace: &Workspace, scanned: Scanned) -> Result<Stage> {
     let batch = &plan.config.batch;
-    let (label, variant, capacity, spans) = match scanned {
-        Scanned::Samples => ("scan samples", part!("common/scan_samples.wgsl"), batch.samples, "ray_spans"),
-        Scanned::Kept => ("scan kept", part!("common/scan_kept.wgsl"), kept_capacity(batch), "kept_spans"),
-        Scanned::Free => ("scan free", part!("common/scan_free.wgsl"), batch.rays, "view_slots"),
+    let (variant, capacity, spans) = match scanned {
+        Scanned::Samples => ("samples", batch.samples, "ray_spans"),
+        Scanned::Kept => ("kept", kept_capacity(batch), "kept_spans"),
+        Scanned::Free => ("free", batch.rays, "view_slots"),
     };
-    let mut parts = vec![COUNTERS, variant, part!("scan.wgsl")];
-    if scanned == Scanned::Free {
-        parts.push(PROGRESS);
-    }
-    let kernel = plan.generated_kernel(gpu, label, &parts, &[("CAPACITY", capacity)], String::new())?;
+    let link = Link::of_file(&format!("scan {variant}"), "scan");
+    let link = link.with("scanned", variant).with("counted", "written").count("CAPACITY", capacity);
+    let kernel = plan.kernel(gpu, &link)?;
     Ok(Stage::fixed(workspace.bind(gpu, &kernel, &[("ray_spans", spans)])?, 1, 1))
 }
 

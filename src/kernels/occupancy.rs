@@ -1,6 +1,6 @@
 //! Refreshing the occupancy grid from the density network.
 
-use super::{COUNTERS, DENSITY, EXP, OCCUPANCY, OCCUPANCY_RAISE, Plan, RANDOM, STEP, Workspace, density};
+use super::{Link, Plan, Workspace, density};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::{Size, Stage};
@@ -31,15 +31,11 @@ impl Update {
     /// # Errors
     /// When a kernel cannot be built.
     pub fn new(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Self> {
-        let parts = [RANDOM, STEP, COUNTERS, OCCUPANCY, part!("occupancy_samples.wgsl")];
-        let samples = plan.kernel(gpu, "occupancy samples", &parts)?;
-        let update = plan.kernel(
-            gpu,
-            "occupancy update",
-            &[STEP, EXP, DENSITY, OCCUPANCY_RAISE, part!("occupancy_update.wgsl")],
-        )?;
-        let mean = plan.kernel(gpu, "occupancy mean", &[part!("occupancy_mean.wgsl")])?;
-        let bits = plan.kernel(gpu, "occupancy bits", &[part!("occupancy_bits.wgsl")])?;
+        let samples = Link::of("occupancy samples").with("counted", "written");
+        let samples = plan.kernel(gpu, &samples)?;
+        let update = plan.kernel(gpu, &Link::of("occupancy update"))?;
+        let mean = plan.kernel(gpu, &Link::of("occupancy mean"))?;
+        let bits = plan.kernel(gpu, &Link::of("occupancy bits"))?;
         let mut chunk = vec![Stage::fixed(workspace.bind(gpu, &samples, &[])?, 1, 1)];
         chunk.extend(density::stages(gpu, plan, workspace)?);
         chunk.push(Stage::fixed(workspace.bind(gpu, &update, &[])?, 1, 1));

@@ -3,7 +3,7 @@
 //! A record is a few words: the colour as the photo has it, then the pixel's position where masks left pixels out,
 //! then its depth where depth is trained on. Ignored pixels have no record, so they are never drawn.
 
-use super::{Part, Plan};
+use super::Plan;
 use crate::dataset::Photo;
 use crate::gpu::banks::{self, rows_of};
 use crate::image::Pixels;
@@ -129,19 +129,6 @@ impl Plan {
     #[must_use]
     pub fn photo_bytes(&self, pixels: impl Iterator<Item = usize>) -> u64 {
         banks::bytes_of(pixels.map(|pixels| self.record().rows(pixels)).sum())
-    }
-
-    pub(super) fn pixels(&self) -> Part {
-        match (self.needs.hdr, self.needs.deep, self.needs.alpha) {
-            (true, ..) => part!("pixels/linear.wgsl"),
-            (false, true, _) => part!("pixels/srgb16.wgsl"),
-            (false, false, true) => part!("pixels/srgb8.wgsl"),
-            (false, false, false) => part!("pixels/srgb8_opaque.wgsl"),
-        }
-    }
-
-    pub(super) fn position(&self) -> Part {
-        if self.needs.masks { part!("position/listed.wgsl") } else { part!("position/all.wgsl") }
     }
 }
 

@@ -1,10 +1,25 @@
 //! The structs that kernels and the host share.
 
 use super::lens;
+use super::training::Tile;
 use crate::camera::Lens;
 use crate::config::Optimizer;
 use crate::dataset::Bounds;
+use crate::gpu::kernel::{Layout, Shared};
 use crate::gpu_struct;
+use crate::model::Level;
+
+/// Every struct that kernels and the host share.
+pub const LAYOUTS: &[Layout] = &[
+    Step::LAYOUT,
+    Counters::LAYOUT,
+    Progress::LAYOUT,
+    RayTarget::LAYOUT,
+    RayResult::LAYOUT,
+    Camera::LAYOUT,
+    Level::LAYOUT,
+    Tile::LAYOUT,
+];
 
 gpu_struct! {
     /// The numbers that change from step to step.

@@ -3,10 +3,7 @@
 use super::color::COLOR_HIDDEN;
 use super::density::{layer_stage, quads};
 use super::marching::{SPARE_ROWS, kept_capacity};
-use super::{
-    ADAM, CAMERA, COUNT_KEPT, COUNTERS, DENSITY, EXP, GRID, KEPT_LOAD, Part, Plan, RANDOM, RAY, RAY_RESULT,
-    RAY_STORE, RAY_TARGET, RayResult, RayTarget, STEP, SUM, USABLE, Workspace, dispatch,
-};
+use super::{Link, Plan, RayResult, RayTarget, Workspace, dispatch, photos};
 use crate::config::Accumulation;
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
@@ -70,22 +67,8 @@ pub(super) fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [
-        RANDOM,
-        STEP,
-        COUNTERS,
-        RAY,
-        RAY_STORE,
-        RAY_TARGET,
-        CAMERA,
-        plan.pixels(),
-        plan.position(),
-        plan.depth_target(),
-        plan.background(),
-        part!("rays.wgsl"),
-    ];
-    let kernel = plan.generated_kernel(gpu, "rays", &parts, &[], workspace.banks_part()?)?;
-    Ok(Stage::indirect(workspace.bind(gpu, &kernel, &[])?, workspace.get("dispatch"), dispatch::RAYS))
+    let link = Link::of("rays").part(photos::NAME, workspace.banks_part()?);
+    plan.ray_stage(gpu, workspace, &link)
 }
 
 /// The fused render, loss and gradient kernel.
@@ -93,23 +76,8 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -> Result<Stage> {
-    let weights = if weights { part!("weights/stored.wgsl") } else { part!("weights/none.wgsl") };
-    let mut parts = vec![
-        COUNTERS,
-        RAY_TARGET,
-        RAY_RESULT,
-        KEPT_LOAD,
-        EXP,
-        SUM,
-        plan.transmittance(),
-        plan.loss(),
-        plan.depth_loss(),
-        plan.distortion(),
-        weights,
-        part!("composite.wgsl"),
-    ];
-    parts.extend(plan.sparsity());
-    plan.ray_stage(gpu, workspace, "composite", &parts)
+    let weights = if weights { "stored" } else { "none" };
+    plan.ray_stage(gpu, workspace, &Link::of("composite").with("weights", weights))
 }
 
 /// Gradients of all activations, from the colour back to the encoding.
@@ -117,37 +85,35 @@ pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -
 /// # Errors
 /// When a kernel cannot be built.
 pub fn backward(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
-    let gradient = part!("layer/gradient.wgsl");
     let last = plan.layout.color.len() - 1;
     let mut stages = Vec::new();
     for (number, layer) in plan.layout.color.iter().enumerate().rev() {
-        let mut parts = vec![COUNTERS, COUNT_KEPT];
-        if number == last {
-            parts.extend([EXP, plan.activation(), part!("layer/gradient_color.wgsl")]);
-        } else {
-            parts.push(gradient);
-        }
-        let (wanted, input, d_input) = if number == 0 {
-            parts.extend([DENSITY, part!("layer/d_features.wgsl")]);
-            (DENSITY_OUTPUTS, "color_input", "d_density_out")
-        } else {
-            parts.push(part!("layer/d_hidden.wgsl"));
-            (layer.inputs, COLOR_HIDDEN[number - 1], D_COLOR_HIDDEN[number - 1])
+        let gradient = if number == last { "color" } else { "linear" };
+        let (wanted, input, d_input, store) = match number {
+            0 => (DENSITY_OUTPUTS, "color_input", "d_density_out", "features"),
+            _ => (layer.inputs, COLOR_HIDDEN[number - 1], D_COLOR_HIDDEN[number - 1], "hidden"),
         };
         let d_output = if number == last { "d_raw_color" } else { D_COLOR_HIDDEN[number] };
         let renamed = [("layer_input", input), ("d_input", d_input), ("d_output", d_output)];
         let label = format!("d color {number}");
-        stages.push(backward_layer(gpu, plan, workspace, (&label, layer, wanted), &parts, &renamed)?);
+        let shape = (label.as_str(), layer, wanted);
+        stages.push(backward_layer(gpu, plan, workspace, shape, [gradient, store], &renamed)?);
     }
     let [hidden, out] = [&plan.layout.density[0], &plan.layout.density[1]];
-    let parts = [COUNTERS, COUNT_KEPT, gradient, part!("layer/d_hidden_of_sample.wgsl")];
     let renamed =
         [("layer_input", "density_hidden"), ("d_input", "d_density_hidden"), ("d_output", "d_density_out")];
-    stages.push(backward_layer(gpu, plan, workspace, ("d density out", out, out.inputs), &parts, &renamed)?);
-    let parts = [COUNTERS, COUNT_KEPT, gradient, part!("layer/d_linear.wgsl")];
+    let variants = ["linear", "hidden_of_sample"];
+    stages.push(backward_layer(
+        gpu,
+        plan,
+        workspace,
+        ("d density out", out, out.inputs),
+        variants,
+        &renamed,
+    )?);
     let renamed = [("d_input", "d_encoding"), ("d_output", "d_density_hidden")];
     let shape = ("d density hidden", hidden, hidden.inputs);
-    stages.push(backward_layer(gpu, plan, workspace, shape, &parts, &renamed)?);
+    stages.push(backward_layer(gpu, plan, workspace, shape, ["linear", "linear"], &renamed)?);
     Ok(stages)
 }
 
@@ -156,11 +122,12 @@ fn backward_layer(
     plan: &Plan,
     workspace: &Workspace,
     (label, shape, wanted): (&str, &Layer, usize),
-    parts: &[Part],
+    [gradient, store]: [&str; 2],
     renamed: &[(&str, &str)],
 ) -> Result<Stage> {
-    let text = plan.product.backward(shape.inputs, wanted, shape.outputs);
-    let kernel = plan.generated_kernel(gpu, label, parts, &quads(shape), text)?;
+    let link = Link::of_text(label, plan.product.backward(shape.inputs, wanted, shape.outputs));
+    let link = link.with("layer_count", "kept").with("layer_gradient", gradient).with("layer_d_store", store);
+    let kernel = plan.kernel(gpu, &link.counts(&quads(shape)))?;
     let size = Size::Indirect(workspace.get("dispatch").clone(), dispatch::KEPT_TILES);
     layer_stage(gpu, workspace, &kernel, shape, renamed, size)
 }
@@ -205,9 +172,8 @@ pub fn weight_gradients(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result
 
 /// The kernel for the weights of layers of `outputs` outputs.
 fn weight_kernel(gpu: &Gpu, plan: &Plan, outputs: usize) -> Result<Kernel> {
-    let parts = [COUNTERS, COUNT_KEPT, part!("layer/tile.wgsl")];
-    let text = plan.product.weight_gradient(outputs / 4);
-    plan.generated_kernel(gpu, &format!("d weights {outputs}"), &parts, &[], text)
+    let link = Link::of_text(&format!("d weights {outputs}"), plan.product.weight_gradient(outputs / 4));
+    plan.kernel(gpu, &link.with("layer_count", "kept"))
 }
 
 /// Finds out whether the gradients can be used, scatters into the table, updates all parameters and ends the
@@ -216,20 +182,14 @@ fn weight_kernel(gpu: &Gpu, plan: &Plan, outputs: usize) -> Result<Kernel> {
 /// # Errors
 /// When a kernel cannot be built.
 pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
-    const MAGNITUDE: Part = part!("common/magnitude.wgsl");
-    let [add, take] = plan.gradient();
-    let mut scattering = [&[COUNTERS, GRID, USABLE, part!("common/corners.wgsl")], add.as_slice()].concat();
-    if plan.accumulation != Accumulation::Ordered {
-        scattering.push(part!("scatter.wgsl"));
-    }
-    let taking = [&[STEP, ADAM], take.as_slice(), &[part!("adam_table.wgsl")]].concat();
-    let bind = |label: &str, parts: &[Part]| workspace.bind(gpu, &plan.kernel(gpu, label, parts)?, &[]);
-    let range = bind("gradient range", &[COUNTERS, RAY_RESULT, MAGNITUDE, part!("gradient_range.wgsl")])?;
-    let sums = bind("weight sums", &[MAGNITUDE, part!("weight_sums.wgsl")])?;
-    let scatter = bind("scatter", &scattering)?;
-    let table = bind("adam table", &taking)?;
-    let mlp = bind("adam mlp", &[STEP, ADAM, USABLE, part!("adam_mlp.wgsl")])?;
-    let finish = bind("finish", &[COUNTERS, RAY_RESULT, USABLE, part!("finish.wgsl")])?;
+    let bind = |link: &Link| workspace.bind(gpu, &plan.kernel(gpu, link)?, &[]);
+    let range = bind(&Link::of("gradient range"))?;
+    let sums = bind(&Link::of("weight sums"))?;
+    let file = if plan.accumulation == Accumulation::Ordered { "scatter_ordered" } else { "scatter" };
+    let scatter = bind(&Link::of_file("scatter", file))?;
+    let table = bind(&Link::of("adam table"))?;
+    let mlp = bind(&Link::of("adam mlp"))?;
+    let finish = bind(&Link::of("finish").with("counted", "written"))?;
     let sizes = workspace.get("dispatch");
     let scatter = match plan.accumulation {
         Accumulation::Ordered => Stage::fixed(scatter, plan.layout.levels.len() / 8, 1),

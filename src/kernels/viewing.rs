@@ -1,9 +1,6 @@
 //! What only rendering needs: how much of a view is in work at once, its rays and their compositing.
 
-use super::{
-    CAMERA, COUNTERS, Camera, DENSITY, EXP, Needs, PROGRESS, Plan, Progress, RAY, RAY_STORE, SUM, Traits,
-    VIEW_RAY, Workspace,
-};
+use super::{Camera, Link, Needs, Plan, Progress, Traits, Workspace};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
@@ -68,8 +65,7 @@ pub fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [COUNTERS, PROGRESS, RAY, RAY_STORE, VIEW_RAY, CAMERA, part!("view_rays.wgsl")];
-    plan.ray_stage(gpu, workspace, "view rays", &parts)
+    plan.ray_stage(gpu, workspace, &Link::of("view rays"))
 }
 
 /// Chooses the samples that get colour.
@@ -77,9 +73,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// # Errors
 /// When the kernel cannot be built.
 pub(super) fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts =
-        [COUNTERS, RAY, VIEW_RAY, CAMERA, EXP, DENSITY, plan.transmittance(), SUM, part!("view_select.wgsl")];
-    plan.ray_stage(gpu, workspace, "view select", &parts)
+    plan.ray_stage(gpu, workspace, &Link::of("view select"))
 }
 
 /// Adds their colours, and writes the pixels of rays that ended.
@@ -87,6 +81,5 @@ pub(super) fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<St
 /// # Errors
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    let parts = [COUNTERS, PROGRESS, VIEW_RAY, part!("view_composite.wgsl")];
-    plan.ray_stage(gpu, workspace, "view composite", &parts)
+    plan.ray_stage(gpu, workspace, &Link::of("view composite"))
 }

@@ -44,7 +44,6 @@ impl Estimate {
         let cameras = cameras(dataset, &dataset.train);
         let config = defaults(traits.is_cpu, dataset)?;
         let needs = needs::of_headers(dataset, &config)?;
-        let left_out = needs::left_out(&needs, &config);
         let plan = plan(traits, config, needs, &dataset.bounds, &cameras);
         let memory = Memory::of_training(&plan, &cameras, dataset.stream_bytes(&dataset.train));
         let excess = gpu.as_ref().and_then(|gpu| memory.check(gpu, &plan).err());
@@ -54,7 +53,7 @@ impl Estimate {
             is_cpu: traits.is_cpu,
             most_photo_bytes: gpu.map(|gpu| Capacity::of(&gpu.device.limits(), plan.memory).bytes()),
             finest: plan.layout.levels.last().map_or(0, |level| level.resolution),
-            left_out,
+            left_out: plan.left_out(),
             excess: excess.map(|error| format!("{error:#}")),
         })
     }

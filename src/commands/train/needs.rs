@@ -1,8 +1,8 @@
-//! What a scene needs of the kernels, and what is left out for it.
+//! What a scene needs of the kernels.
 
 use anyhow::{Result, ensure};
 use nerf::camera::LensKind;
-use nerf::config::{Background, Config};
+use nerf::config::Config;
 use nerf::dataset::{Dataset, Frame, evenly_spaced};
 use nerf::image::{BitDepth, Image};
 use nerf::kernels::Needs;
@@ -76,26 +76,4 @@ fn grey(dataset: &Dataset) -> Result<f32> {
     let grey = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp() as f32;
     ensure!(grey.is_normal(), "the photos are as dark or as bright as {grey:e}; scale them to about 1");
     Ok(grey)
-}
-
-/// The parts that are not linked, with the reason.
-pub(in crate::commands) fn left_out(needs: &Needs, config: &Config) -> Vec<String> {
-    let parts = [
-        (needs.cascades == 1, "cascades and growing steps (the scene is bounded)"),
-        (!needs.alpha && !needs.hdr, "alpha (the images are opaque)"),
-        (!needs.hdr, "linear pixels and the relative loss (the images are display-referred)"),
-        (needs.hdr || !needs.deep, "16-bit pixels (no image has them)"),
-        (needs.hdr || needs.deep, "8-bit pixels (not all images have them)"),
-        (!needs.masks, "masks (there are none)"),
-        (!needs.depth, "depth (loss.depth is 0)"),
-        (config.loss.distortion == 0.0, "the distortion loss (loss.distortion is 0)"),
-        (config.loss.sparsity == 0.0, "the sparsity loss (loss.sparsity is 0)"),
-        (config.background != Background::Random, "random backgrounds (not asked for)"),
-    ];
-    let absent = LensKind::ALL.into_iter().filter(|kind| !needs.lenses.contains(kind));
-    let absent: Vec<_> = absent.map(LensKind::name).collect();
-    let lenses =
-        (!absent.is_empty()).then(|| format!("lens models {} (no camera has them)", absent.join("/")));
-    let others = parts.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, part)| part.to_owned());
-    lenses.into_iter().chain(others).collect()
 }

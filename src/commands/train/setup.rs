@@ -117,7 +117,7 @@ impl Setup {
             ends.join(" or "),
             if self.state.is_some() { format!(", from step {} on", self.about.step) } else { String::new() }
         ));
-        remarks.say(&format!("left out: {}", needs::left_out(&self.plan.needs, config).join(", ")));
+        remarks.say(&format!("left out: {}", self.plan.left_out().join(", ")));
     }
 }
 

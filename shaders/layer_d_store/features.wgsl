@@ -1,5 +1,6 @@
-// Provides: layer_d_store, the gradient of the density network's outputs; the first one also carries the
-// gradient of the log-density that the fused kernel found. Needs: density.
+// Provides: layer_d_store, the gradient of the density network's outputs; the first one also carries the gradient of
+// the log-density that the fused kernel found.
+// needs: density
 
 tensor<read> d_color: vec4<f32>;
 tensor<read> density_out: vec4<f32>;

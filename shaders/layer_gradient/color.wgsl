@@ -1,5 +1,6 @@
-// Provides: layer_gradient, the gradient of the colour network's raw outputs, which it also stores for the
-// weights' gradient. Needs: activation.
+// Provides: layer_gradient, the gradient of the colour network's raw outputs, which it also stores for the weights'
+// gradient.
+// needs: activation
 
 tensor<read> color: vec4<f32>;
 tensor<read> d_color: vec4<f32>;

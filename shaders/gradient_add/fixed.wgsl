@@ -1,5 +1,6 @@
 // Provides: gradients of the table as 64-bit integers, each in two 32-bit atomics, the lower half first. Sums of
-// integers do not depend on their order. Needs: fixed_scale.
+// integers do not depend on their order.
+// needs: fixed_scale
 
 var<storage, read_write> d_table: array<atomic<u32>>;
 

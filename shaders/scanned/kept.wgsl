@@ -1,5 +1,5 @@
 // The kept samples: which rays fit, and the sizes of the dispatches over kept samples.
-// Needs: counters, scan.
+// needs: counters
 
 fn scan_rays() -> u32 {
     return counters.rays_used;

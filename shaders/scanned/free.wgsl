@@ -1,5 +1,5 @@
 // The free slots of a view's rays, which take the next pixels, and what a ray may ask for in the round that begins.
-// Needs: counters, progress, scan.
+// needs: counters, progress
 
 var<storage, read_write> progress: Progress;
 

@@ -1,6 +1,7 @@
-// Provides: gradient_scale, the power of two by which gradients become 64-bit integers: the largest with which the
-// sum of all kept samples' gradients cannot overflow. What it loses is 2^-60 of the largest gradient, times the
-// number of samples. Needs: counters, usable.
+// Provides: gradient_scale, the power of two by which gradients become 64-bit integers: the largest with which the sum
+// of all kept samples' gradients cannot overflow. What it loses is 2^-60 of the largest gradient, times the number of
+// samples.
+// needs: counters, usable
 
 fn gradient_scale_exponent() -> i32 {
     // |gradient| < 2^most, and the number of samples < 2^samples.

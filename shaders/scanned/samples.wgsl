@@ -1,5 +1,5 @@
 // The marched samples: which rays fit, and the sizes of the dispatches over samples.
-// Needs: counters, scan.
+// needs: counters
 
 fn scan_rays() -> u32 {
     return counters.rays;

@@ -1,4 +1,5 @@
-// Provides: layer_store, the colour of a row. Needs: activation.
+// Provides: layer_store, the colour of a row.
+// needs: activation
 
 tensor<write> color: vec4<f32>;
 

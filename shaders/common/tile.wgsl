@@ -1,4 +1,4 @@
-// Provides: what a tile of a weight gradient reads and writes. Needs: count_kept.
+// Provides: what a tile of a weight gradient reads and writes.
 
 struct Tile {
     // Quads per row of the inputs.

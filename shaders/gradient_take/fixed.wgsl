@@ -1,6 +1,6 @@
-// Provides: gradient_take for gradients summed as integers; see gradient/fixed.wgsl. Needs: counters, fixed_scale.
+// Provides: gradient_take for gradients summed as integers; see gradient/fixed.wgsl.
+// needs: fixed_scale
 
-var<uniform> counters: Counters;
 // Low and high half of both sums.
 var<storage, read_write> d_table: array<vec4<u32>>;
 

@@ -1,0 +1,3 @@
+// Provides: the counters, for kernels that only read them.
+
+var<uniform> counters: Counters;

@@ -1,7 +1,0 @@
-// Provides: the rows of a layer that runs over all marched samples. Needs: counters.
-
-var<uniform> counters: Counters;
-
-fn layer_count() -> u32 {
-    return counters.samples;
-}
