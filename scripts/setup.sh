@@ -44,7 +44,7 @@ if ! command -v cc >/dev/null; then
 fi
 if ! command -v python3 >/dev/null; then
     is_debian || fail "no python3 was found: install Python 3.8 or newer"
-    install "Python" python3-minimal
+    install "Python" python3
 fi
 # macOS has Metal and Windows has DX12.
 if [ "$(uname -s)" = Linux ] && ! has_vulkan; then
