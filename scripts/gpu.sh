@@ -360,7 +360,8 @@ printf 'part\tstatus\tcode\tseconds\treason\n' >"$out/parts.tsv"
 archive
 find_driver
 for part in "${parts[@]}"; do
-    read -r -a words < <(printf '%s\n' "$part")
+    # shellcheck disable=SC2206
+    words=($part)
     name=${words[0]} limit=${words[1]} least=$((words[2] * percent / 100))
     # The last seconds are for the archive.
     left=$((most - 5 - (SECONDS - begin)))

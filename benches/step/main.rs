@@ -162,7 +162,9 @@ fn main() -> Result<()> {
         return only_start(&args, &dataset, began);
     }
     let ceilings = args.ceilings.as_deref().map_or(Value::Null, ceilings);
-    let start = if args.no_start { None } else { Some(cold_start(&args, &dataset)?) };
+    // What is measured behind it does not depend on it.
+    let told = |error: anyhow::Error| say(&format!("warning: no cold start: {error:#}"));
+    let start = if args.no_start { None } else { cold_start(&args, &dataset).map_err(told).ok() };
     let mut run = Run::new(&args, &dataset)?;
     say("warming up");
     run.train(args.warm)?;
