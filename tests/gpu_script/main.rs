@@ -140,7 +140,7 @@ fn parts_that_fail_or_hang_do_not_stop_the_rest() {
     let begin = Instant::now();
     let variables = [("FAIL", "step"), ("HANG", "train_lego_12s"), ("LIMIT", "2")];
     assert_eq!(machine.run(&variables), Some(2));
-    assert!(begin.elapsed() < Duration::from_secs(60), "a part that hangs is ended");
+    assert!(begin.elapsed() < Duration::from_secs(300), "a part that hangs is ended");
     let (merged, report, readme) = machine.results();
     assert_eq!(
         (count(&merged, "done"), count(&merged, "failed"), count(&merged, "timeout")),
@@ -179,10 +179,10 @@ fn errors_are_not_taken_for_wrong_kernels_or_results() {
         (
             "DIVERGED",
             "train_lego_12s",
-            "| train_lego_12s | failed | error: the training has no PSNR: it diverged | 0 |",
+            "| train_lego_12s | failed | error: the training has no PSNR: it diverged |",
         ),
-        ("BROKEN", "train_lego_12s", "| train_lego_12s | failed | the device was lost | 0 |"),
-        ("BROKEN", "exchange", "| check_exchange | failed | the device was lost | 0 |"),
+        ("BROKEN", "train_lego_12s", "| train_lego_12s | failed | the device was lost |"),
+        ("BROKEN", "exchange", "| check_exchange | failed | the device was lost |"),
         ("BROKEN", "kernels", "| kernels | failed |"),
     ] {
         let machine = Machine::new(&format!("{variable}_{broken}"));
@@ -196,7 +196,7 @@ fn errors_are_not_taken_for_wrong_kernels_or_results() {
 #[test]
 fn parts_without_time_are_left_out_and_told() {
     let machine = Machine::new("short");
-    assert_eq!(machine.run(&[("SECONDS_ALL", "30")]), Some(2));
+    assert_eq!(machine.run(&[("SECONDS_ALL", "60")]), Some(2));
     let (merged, report, _) = machine.results();
     assert!(count(&merged, "skipped") >= 2 && count(&merged, "done") > 10, "{report}");
     assert!(report.contains("| train_lego_60s | skipped |"), "{report}");
@@ -246,13 +246,13 @@ fn a_killed_call_leaves_what_was_known() {
     let summary = machine.folder.join("results/summary.txt");
     let begin = Instant::now();
     while !fs::read_to_string(&summary).is_ok_and(|text| text.contains("train_lego_60s")) {
-        assert!(begin.elapsed() < Duration::from_secs(60), "the script did not get that far");
+        assert!(begin.elapsed() < Duration::from_secs(300), "the script did not get that far");
         std::thread::sleep(Duration::from_millis(50));
     }
     Command::new("kill").args(["-KILL", "--", &format!("-{}", call.id())]).assert().success();
     assert_eq!(call.wait().expect("ended").signal(), Some(9));
     let (merged, report, readme) = machine.results();
-    assert_eq!((count(&merged, "done"), count(&merged, "missing")), (11, PARTS - 11));
+    assert_eq!((count(&merged, "done"), count(&merged, "missing")), (11, PARTS - 11), "{report}");
     assert!(report.contains("| render | missing |  | - |"), "{report}");
     assert!(readme.contains("missing / missing / missing / missing | missing | missing |"), "{readme}");
 }
