@@ -15,7 +15,7 @@ use crate::model::{DENSITY_OUTPUTS, Layer};
 use anyhow::Result;
 
 gpu_struct! {
-    /// The shape of a layer whose weight gradient is summed; see `shaders/layer/tile.wgsl`.
+    /// The shape of a layer whose weight gradient is summed; see `shaders/common/tile.wgsl`.
     Tile {
         /// Quads per row of inputs.
         input_quads: u32,

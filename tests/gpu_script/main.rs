@@ -5,7 +5,6 @@
 use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
@@ -50,44 +49,39 @@ impl Machine {
 
     /// What the archive becomes: the merged results, the report and the README.
     fn results(&self) -> (Value, String, String) {
-        let readme = self.folder.join("README.md");
         let text = "before\n<!-- written by scripts/gpu_results.py -->\nold\n<!-- end of what scripts/gpu_results.py \
                     writes -->\nafter\n";
-        fs::write(&readme, text).expect("writable");
-        let pages = self.folder.join("pages");
-        Command::new("python3")
-            .arg(Path::new(ROOT).join("scripts/gpu_results.py"))
-            .args([&self.folder.join("results/results.tar.gz"), &pages, &readme])
-            .assert()
-            .success();
-        let page = fs::read_dir(&pages).expect("pages").next().expect("a folder").expect("an entry").path();
+        let (page, readme) = self.page(text, true);
         assert!(page.to_string_lossy().ends_with("_test-gpu"), "{}", page.display());
-        let read = |path: &Path| fs::read_to_string(path).expect("text");
-        let merged = serde_json::from_str(&read(&page.join("gpu.json"))).expect("JSON");
-        (merged, read(&page.join("report.md")), read(&readme))
+        (merged(&page), fs::read_to_string(page.join("report.md")).expect("text"), readme)
     }
-}
 
-impl Machine {
-    /// The results of an archive without any adapter.
-    fn merged(&self) -> Value {
-        let pages = self.folder.join("pages");
-        let readme = self.folder.join("none.md");
-        // Without its two lines the README is not written, and that is an error.
-        fs::write(&readme, "").expect("writable");
-        Command::new("python3")
-            .arg(Path::new(ROOT).join("scripts/gpu_results.py"))
-            .args([&self.folder.join("results/results.tar.gz"), &pages, &readme])
-            .assert()
-            .failure();
+    /// The folder that the archive becomes, and what is then in a README of `text`.
+    fn page(&self, text: &str, is_written: bool) -> (PathBuf, String) {
+        let (pages, readme) = (self.folder.join("pages"), self.folder.join("README.md"));
+        fs::write(&readme, text).expect("writable");
+        let mut convert = Command::new("python3");
+        convert.arg(Path::new(ROOT).join("scripts/gpu_results.py"));
+        convert.args([&self.folder.join("results/results.tar.gz"), &pages, &readme]);
+        let assert = convert.assert();
+        if is_written {
+            assert.success()
+        } else {
+            assert.failure()
+        };
         let page = fs::read_dir(&pages).expect("pages").next().expect("a folder").expect("an entry").path();
-        serde_json::from_str(&fs::read_to_string(page.join("gpu.json")).expect("text")).expect("JSON")
+        (page, fs::read_to_string(readme).expect("text"))
     }
 }
 
+fn merged(page: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(page.join("gpu.json")).expect("text")).expect("JSON")
+}
+
+/// Copies a program in a process of its own: what another test forks meanwhile would hold a file that is written here, and
+/// nothing can run it as long as it is.
 fn copy(from: &str, to: &Path) {
-    fs::copy(Path::new(ROOT).join(from), to).expect("copied");
-    fs::set_permissions(to, fs::Permissions::from_mode(0o755)).expect("executable");
+    Command::new("install").args(["-m", "755"]).arg(Path::new(ROOT).join(from)).arg(to).assert().success();
 }
 
 /// How many parts ended so.
@@ -235,7 +229,9 @@ fn a_stopped_call_tells_so() {
     assert_eq!(call.wait().expect("ended").code(), Some(2));
     assert!(told.elapsed() < Duration::from_secs(15), "the part ended with it");
     assert!(fs::read_to_string(&summary).is_ok_and(|text| text.ends_with("stopped\n")));
-    assert_eq!(count(&machine.merged(), "missing"), PARTS);
+    // Without its two lines the README is not written, and that is an error.
+    let (page, _) = machine.page("", false);
+    assert_eq!(count(&merged(&page), "missing"), PARTS);
 }
 
 #[test]
