@@ -11,15 +11,16 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use image::{ImageBuffer, ImageFormat, Rgb};
 use nerf::camera::{Camera, LensKind};
+use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions};
 use nerf::config::Config;
-use nerf::dataset::{Dataset, HoldOut, OpenOptions, Reading};
+use nerf::field::parameters::{Layout, finest_resolution};
+use nerf::field::train::Trainer;
+use nerf::field::views::Views;
+use nerf::field::{Needs, Plan};
 use nerf::gpu::{Gpu, adapter};
-use nerf::kernels::{Needs, Plan};
-use nerf::memory::Memory;
-use nerf::model::{Layout, finest_resolution};
-use nerf::train::Trainer;
-use nerf::views::Views;
-use nerf::words::bytes;
+use nerf::photo::Reading;
+use nerf::run::memory::Memory;
+use nerf::support::format::bytes;
 use rayon::prelude::*;
 
 /// Measured if nothing is said.

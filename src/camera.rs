@@ -4,12 +4,15 @@
 //! the top-left corner of the image, +x right and +y down; the centre of pixel `(i, j)` is
 //! `(i + 0.5, j + 0.5)`.
 
+mod bounds;
 mod branch;
 mod equirectangular;
 mod fisheye;
 mod lens;
 mod open_cv;
+pub mod orbit;
 
+pub use bounds::Bounds;
 pub use lens::{Lens, LensKind};
 
 use glam::{DAffine3, DVec2, DVec3};

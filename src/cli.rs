@@ -7,8 +7,9 @@ pub(crate) mod info;
 pub(crate) mod reading;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use nerf::capture::dataset::HoldOut;
 use nerf::config::Background;
-use nerf::dataset::{HoldOut, Split};
+use nerf::photo::Split;
 use std::path::PathBuf;
 
 /// Train neural radiance fields from posed photos and render new views of them.

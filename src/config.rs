@@ -1,6 +1,7 @@
 //! Every number that shapes a training, with its default; read from JSON, stored in the checkpoint.
 
 mod ranges;
+pub mod schedule;
 
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};

@@ -7,15 +7,15 @@
 //! transforms.json + images ──> dataset ──> train ──> checkpoint ──> render ──> EXR, PNG, scores
 //! ```
 //!
-//! [`dataset`] reads cameras and photos, [`health`] says what is wrong with them, and [`views::Views`] brings them to
-//! the device, where [`memory`] has said that there is room. [`train::Trainer`] owns the field on the device and takes steps: rays,
-//! march, density, selection, colour, the fused render·loss·gradient kernel, backward, Adam. [`checkpoint`]
-//! keeps a field on disk. [`render::Renderer`] shows it to any camera. The command line on top of it is the
+//! [`capture`] reads cameras and photos from files and says what is wrong with them; [`field`] is the radiance field
+//! on a device: [`field::train::Trainer`] takes steps (rays, march, density, selection, colour, the fused
+//! render·loss·gradient kernel, backward, Adam), [`field::render::Renderer`] shows it to any camera,
+//! [`field::checkpoint`] keeps it on disk. [`run`] is a training run as a whole, and the command line on top of it is the
 //! binary of this package.
 //!
-//! Underneath, [`model`] lays out the parameters, [`kernels`] lists what runs on the device, and [`gpu`] knows
-//! how: choosing an adapter, linking WGSL, binding by name. [`mod@reference`] is the same mathematics in plain
-//! `f64`, which the kernels are tested against, and [`scene`] renders scenes whose truth is known.
+//! Underneath, [`camera`], [`photo`] and [`config`] are plain values, and [`gpu`] knows adapters, linking and binding by
+//! name. [`verify`] has the same mathematics in plain `f64`, which the kernels are tested against, and scenes whose
+//! truth is known.
 //!
 //! # Conventions
 //!
@@ -30,8 +30,8 @@
 //! # A training in code
 //!
 //! ```no_run
-//! use nerf::{camera::LensKind, config::Config, dataset::Dataset, gpu, kernels::{Needs, Plan}};
-//! use nerf::{model, train, views::Views};
+//! use nerf::{camera::LensKind, capture::dataset::Dataset, config::Config, gpu};
+//! use nerf::field::{Needs, Plan, parameters, train, views::Views};
 //! use std::{path::Path, sync::Arc};
 //!
 //! # fn main() -> anyhow::Result<()> {
@@ -41,8 +41,8 @@
 //! let cameras: Vec<_> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
 //! let gpu = Arc::new(gpu::Gpu::open(&gpu::adapter::choose(None)?)?);
 //! let config = Config::default();
-//! let finest = model::finest_resolution(&config.grid, &dataset.bounds, &cameras);
-//! let layout = model::Layout::new(&config, finest);
+//! let finest = parameters::finest_resolution(&config.grid, &dataset.bounds, &cameras);
+//! let layout = parameters::Layout::new(&config, finest);
 //! let needs = Needs {
 //!     lenses: LensKind::among(&cameras),
 //!     alpha: images.iter().any(|image| image.has_alpha),
@@ -66,29 +66,12 @@
 //! ```
 
 pub mod camera;
-pub mod chart;
-pub mod check;
-pub mod checkpoint;
+pub mod capture;
 pub mod config;
-pub mod dataset;
-pub mod depths;
-pub mod file;
+pub mod field;
 pub mod gpu;
-pub mod health;
-pub mod image;
-pub mod kernels;
-pub mod memory;
-pub mod metrics;
-pub mod model;
-pub mod orbit;
-pub mod picture;
+pub mod photo;
 pub mod quadrature;
-pub mod reference;
-pub mod render;
-pub mod report;
-pub mod scene;
-pub mod schedule;
-pub mod train;
-pub mod views;
-pub mod visibility;
-pub mod words;
+pub mod run;
+pub mod support;
+pub mod verify;

@@ -23,9 +23,9 @@
 
 pub mod order;
 
-use crate::reference::Transmittance;
-use crate::reference::composite::{CompositeInput, composite};
-use crate::reference::selection::{Luck, Selection, select};
+use crate::verify::reference::Transmittance;
+use crate::verify::reference::composite::{CompositeInput, composite};
+use crate::verify::reference::selection::{Luck, Selection, select};
 
 /// Log-density of nothing: its optical depth is 10⁻²⁶ per unit of length.
 const EMPTY: f64 = -60.0;

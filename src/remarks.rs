@@ -1,7 +1,7 @@
 //! Remarks on stderr.
 
 use crate::cli::Global;
-use nerf::dataset::{Dataset, Severity};
+use nerf::capture::dataset::{Dataset, Severity};
 use std::io::Write;
 
 /// Prints remarks as far as they are wanted.

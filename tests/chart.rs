@@ -1,6 +1,6 @@
 //! Charts: what is drawn for good data and for odd data.
 
-use nerf::chart::{Axis, Chart, Mark, Series};
+use nerf::support::chart::{Axis, Chart, Mark, Series};
 
 fn chart(x: Axis, y: Axis, series: Vec<Series>) -> Chart {
     Chart { title: "A <title> & more".to_owned(), x, y, series }

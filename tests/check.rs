@@ -1,10 +1,10 @@
 //! `nerf check`: its table, its JSON, and what it says of files that it cannot pass.
 
 use assert_cmd::Command;
-use nerf::check::draw::Random;
-use nerf::check::hard_rays::HardRay;
-use nerf::reference::Transmittance;
-use nerf::reference::vectors::{GoldenFile, NOT_FINITE};
+use nerf::verify::check::draw::Random;
+use nerf::verify::check::hard_rays::HardRay;
+use nerf::verify::reference::Transmittance;
+use nerf::verify::reference::vectors::{GoldenFile, NOT_FINITE};
 use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::{Value, json};

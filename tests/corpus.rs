@@ -4,7 +4,7 @@ mod shared;
 
 use nerf::camera::LensKind::{self, OpenCv, Pinhole};
 use nerf::camera::{Camera, Lens};
-use nerf::dataset::{Dataset, OpenOptions, transforms};
+use nerf::capture::dataset::{Dataset, OpenOptions, transforms};
 use serde_json::Value;
 use shared::shared;
 

@@ -5,8 +5,9 @@ mod shared;
 use std::path::Path;
 
 use nerf::camera::Lens;
-use nerf::dataset::{AlphaMode, Dataset, HoldOut, OpenOptions, read_cameras};
-use nerf::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions, read_cameras};
+use nerf::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use nerf::photo::AlphaMode;
 use shared::shared;
 
 fn open(path: &Path) -> Dataset {

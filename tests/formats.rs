@@ -7,7 +7,8 @@ use exr::prelude::{
     LayerAttributes, LineOrder, Vec2, WritableImage, f16,
 };
 use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageBuffer, ImageFormat, Rgb, Rgba};
-use nerf::image::{BitDepth, Header, Image, MOST_PIXELS, Pixels, load_depth};
+use nerf::capture::image::{Header, MOST_PIXELS, load_depth};
+use nerf::photo::{BitDepth, Image, Pixels};
 use proptest::prelude::*;
 
 /// A 4x1 PNG with a palette of four colours, two bits a pixel, the second one half transparent.

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use nerf::reference::Transmittance;
-use nerf::reference::composite::composite;
-use nerf::reference::textbook::{Precision, textbook_d_s};
-use nerf::reference::vectors::{Expected, GoldenFile, NOT_FINITE, RayError};
+use nerf::verify::reference::Transmittance;
+use nerf::verify::reference::composite::composite;
+use nerf::verify::reference::textbook::{Precision, textbook_d_s};
+use nerf::verify::reference::vectors::{Expected, GoldenFile, NOT_FINITE, RayError};
 
 const CONVENTIONS: [Transmittance; 2] = [Transmittance::Exclusive, Transmittance::Inclusive];
 

@@ -6,7 +6,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use nerf::dataset::{Severity, transforms};
+use nerf::capture::dataset::{Severity, transforms};
 
 /// What is said about one file, a line per remark.
 fn remarks(name: &str, bytes: &[u8]) -> String {

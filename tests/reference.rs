@@ -1,15 +1,15 @@
 //! The gradients of the f64 reference against central differences of its own forward passes, and properties.
 
 use glam::DVec3;
-use nerf::reference::activation::{color, color_backward, log_density, log_density_backward};
-use nerf::reference::composite::{CompositeInput, CompositeOutput, composite};
-use nerf::reference::grid::{FEATURES, grid_encode, grid_encode_backward, levels, table_entries};
-use nerf::reference::loss::Loss;
-use nerf::reference::mlp::Mlp;
-use nerf::reference::model::{BatchOutput, Model, Objective, RaySample, TrainingRay};
-use nerf::reference::random::{random_u32, uniform};
-use nerf::reference::step::Training;
-use nerf::reference::{ColorRange, Transmittance};
+use nerf::verify::reference::activation::{color, color_backward, log_density, log_density_backward};
+use nerf::verify::reference::composite::{CompositeInput, CompositeOutput, composite};
+use nerf::verify::reference::grid::{FEATURES, grid_encode, grid_encode_backward, levels, table_entries};
+use nerf::verify::reference::loss::Loss;
+use nerf::verify::reference::mlp::Mlp;
+use nerf::verify::reference::model::{BatchOutput, Model, Objective, RaySample, TrainingRay};
+use nerf::verify::reference::random::{random_u32, uniform};
+use nerf::verify::reference::step::Training;
+use nerf::verify::reference::{ColorRange, Transmittance};
 
 const CONVENTIONS: [Transmittance; 2] = [Transmittance::Exclusive, Transmittance::Inclusive];
 

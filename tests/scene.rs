@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec3, dvec3};
 use nerf::camera::{Camera, Lens, LensKind, Ray};
-use nerf::dataset::{Dataset, OpenOptions};
-use nerf::scene::{Generate, Hit, Scene, Views, generate, names};
+use nerf::capture::dataset::{Dataset, OpenOptions};
+use nerf::verify::scene::{Generate, Hit, Scene, Views, generate, names};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;

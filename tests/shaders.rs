@@ -5,14 +5,14 @@ use std::path::Path;
 
 use nerf::camera::LensKind;
 use nerf::config::{Accumulation, Config};
+use nerf::field::layer::Product;
+use nerf::field::link::{self, Link};
+use nerf::field::parameters::Layout;
+use nerf::field::{LAYOUTS, Needs, Plan, Traits, records};
 use nerf::gpu::banks::Capacity;
 use nerf::gpu::kernel::Layout as StructLayout;
 use nerf::gpu::source::{Linked, Source};
 use nerf::gpu::tensor::Memory;
-use nerf::kernels::layer::Product;
-use nerf::kernels::link::{self, Link};
-use nerf::kernels::{LAYOUTS, Needs, Plan, Traits, photos};
-use nerf::model::Layout;
 use wgpu::{BindingType, naga};
 
 /// A file of `shaders/` by its name below it, without the ending.
@@ -78,7 +78,7 @@ impl Linker {
         let (mut slots, mut seen) = (Vec::new(), BTreeSet::new());
         let mut left: Vec<String> = link::needs(text_of_main).map(str::to_owned).collect();
         while let Some(name) = left.pop() {
-            if !seen.insert(name.clone()) || name == "lens" || name == photos::NAME {
+            if !seen.insert(name.clone()) || name == "lens" || name == records::NAME {
                 continue;
             }
             let files: Vec<String> = match self.slots.get_key_value(name.as_str()) {
@@ -206,7 +206,7 @@ fn every_combination_links() {
                     .into_iter()
                     .map(|banks| {
                         linker.link_all(
-                            &kernel.clone().part(photos::NAME, capacity.part(photos::NAME, banks)),
+                            &kernel.clone().part(records::NAME, capacity.part(records::NAME, banks)),
                             &main,
                             &fixed(file),
                         )
@@ -284,7 +284,7 @@ fn files_use_what_they_say_that_they_need() {
     for name in names {
         let own = text(&name);
         let code: String = own.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
-        for needed in link::needs(&own).filter(|needed| !["lens", photos::NAME].contains(needed)) {
+        for needed in link::needs(&own).filter(|needed| !["lens", records::NAME].contains(needed)) {
             let files: Vec<String> = match slots.get(needed) {
                 Some(variants) => variants.iter().map(|variant| format!("{needed}/{variant}")).collect(),
                 None => vec![format!("common/{needed}")],

@@ -1,17 +1,17 @@
 //! Trainings that would break a careless trainer: each guard has a test that fails without it.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
+use nerf::camera::Bounds;
 use nerf::camera::{Camera, Lens, LensKind};
 use nerf::config::{Accumulation, Batch, ColorLoss, Config, Grid, March, Network, Occupancy};
-use nerf::dataset::Bounds;
+use nerf::field::parameters::Layout;
+use nerf::field::render::{Renderer, View};
+use nerf::field::train::{State, StepStats, Trainer};
+use nerf::field::training::STATE;
+use nerf::field::views::Views;
+use nerf::field::{Counters, Needs, Plan};
 use nerf::gpu::{Gpu, adapter};
-use nerf::image::{Image, Pixels};
-use nerf::kernels::training::STATE;
-use nerf::kernels::{Counters, Needs, Plan};
-use nerf::model::Layout;
-use nerf::render::{Renderer, View};
-use nerf::train::{State, StepStats, Trainer};
-use nerf::views::Views;
+use nerf::photo::{Image, Pixels};
 use std::sync::Arc;
 
 const LEARNING_RATE: f64 = 1e-2;

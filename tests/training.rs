@@ -4,8 +4,8 @@ mod driving;
 
 use driving::{SMOKE, checkpoint, folder, generated, nerf, number, object, rows, text, train};
 use nerf::camera::LensKind;
-use nerf::image::read_exr_channel;
-use nerf::kernels::training::STATE;
+use nerf::capture::image::read_exr_channel;
+use nerf::field::training::STATE;
 use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;

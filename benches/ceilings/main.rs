@@ -8,12 +8,12 @@
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use nerf::file::write_atomically;
 use nerf::gpu::buffer::Buffer;
 use nerf::gpu::kernel::Kernel;
 use nerf::gpu::pass::{GROUP_COLUMNS, Stage};
 use nerf::gpu::source::Source;
 use nerf::gpu::{Gpu, WANTED_FEATURES, adapter};
+use nerf::support::file::write_atomically;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::iter::repeat_n;

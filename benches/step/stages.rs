@@ -2,8 +2,8 @@
 
 use super::work::{Load, Work};
 use anyhow::{Result, ensure};
-use nerf::kernels::Plan;
-use nerf::train::StepStats;
+use nerf::field::Plan;
+use nerf::field::train::StepStats;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;

@@ -4,8 +4,8 @@
 //! and levels that are small above that of gathers from anywhere.
 
 use nerf::config::Accumulation;
-use nerf::kernels::Plan;
-use nerf::model::{COLOR_INPUTS, DENSITY_OUTPUTS, Layer};
+use nerf::field::Plan;
+use nerf::field::parameters::{COLOR_INPUTS, DENSITY_OUTPUTS, Layer};
 use serde::Serialize;
 use serde_json::Value;
 

@@ -2,7 +2,7 @@
 
 use super::reading::Reading;
 use clap::Args;
-use nerf::dataset::HoldOut;
+use nerf::capture::dataset::HoldOut;
 use std::path::PathBuf;
 
 /// `nerf info`

@@ -1,7 +1,7 @@
 //! How photos are read, on the command line.
 
 use clap::{Args, ValueEnum};
-use nerf::dataset::{AlphaMode, Crop, Reading as Settings};
+use nerf::photo::{AlphaMode, Crop, Reading as Settings};
 
 /// How photos are read; what is not said stays as it is.
 #[derive(Args, Clone, Debug, Default)]

@@ -6,10 +6,11 @@ use super::{Session, find_frames, open_to_compare, writable_folder};
 use crate::cli::Eval;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
-use nerf::dataset::{Dataset, Split};
-use nerf::image::write_png_rgba8;
-use nerf::picture::{ColorSpace, opaque_srgb8};
-use nerf::words::{count, few};
+use nerf::capture::dataset::Dataset;
+use nerf::capture::image::write_png_rgba8;
+use nerf::photo::Split;
+use nerf::photo::color::{ColorSpace, opaque_srgb8};
+use nerf::support::format::{count, few};
 use serde_json::{Value, json};
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {

@@ -4,11 +4,12 @@ use super::scores::{Judge, Means, Score};
 use super::train::setup::Setup;
 use crate::remarks::Remarks;
 use anyhow::Result;
-use nerf::dataset::{Dataset, Photo, evenly_spaced};
+use nerf::capture::dataset::{Dataset, evenly_spaced};
+use nerf::field::Workspace;
+use nerf::field::render::Renderer;
 use nerf::gpu::Gpu;
-use nerf::kernels::Workspace;
-use nerf::picture::ColorSpace;
-use nerf::render::Renderer;
+use nerf::photo::Photo;
+use nerf::photo::color::ColorSpace;
 use std::sync::Arc;
 
 /// Renders test views of a field in training and compares them, on black.

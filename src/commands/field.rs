@@ -3,11 +3,11 @@
 use super::Session;
 use anyhow::Result;
 use nerf::camera::LensKind;
-use nerf::checkpoint::{self, About, Checkpoint};
+use nerf::field::checkpoint::{self, About, Checkpoint};
+use nerf::field::render::{PARAMETERS, Renderer};
+use nerf::field::{Plan, Workspace, density, training};
 use nerf::gpu::Gpu;
-use nerf::kernels::{Plan, Workspace, density, training};
-use nerf::picture::ColorSpace;
-use nerf::render::{PARAMETERS, Renderer};
+use nerf::photo::color::ColorSpace;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

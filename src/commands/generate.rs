@@ -4,8 +4,8 @@ use super::Session;
 use crate::cli::generate::Generate;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
-use nerf::scene::{self, Views};
-use nerf::words::count;
+use nerf::support::format::count;
+use nerf::verify::scene::{self, Views};
 use serde_json::json;
 
 pub(super) fn run(args: &Generate, session: &Session<'_>) -> Result<()> {

@@ -3,13 +3,14 @@
 use crate::progress::Progress;
 use crate::remarks::Remarks;
 use anyhow::Result;
-use nerf::dataset::{Dataset, Photo};
-use nerf::depths::{Depths, Onlookers, fog, median_depth};
-use nerf::metrics::{filled, psnr_where, ssim};
-use nerf::picture::{ColorSpace, photo_over};
-use nerf::render::Renderer;
-use nerf::report::views::ViewScores;
-use nerf::words::percent;
+use nerf::capture::dataset::Dataset;
+use nerf::field::render::Renderer;
+use nerf::photo::Photo;
+use nerf::photo::color::{ColorSpace, photo_over};
+use nerf::run::depths::{Depths, Onlookers, fog, median_depth};
+use nerf::run::report::views::ViewScores;
+use nerf::support::format::percent;
+use nerf::support::metrics::{filled, psnr_where, ssim};
 use serde::{Serialize, Serializer};
 use std::time::Instant;
 

@@ -1,7 +1,7 @@
 //! Driving the program from end to end: folders of a test run, datasets, trainings and what they say.
 
 use assert_cmd::Command;
-use nerf::checkpoint::Checkpoint;
+use nerf::field::checkpoint::Checkpoint;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! The optimiser where there is nothing to divide by.
 
 use anyhow::Result;
-use nerf::check::Setup;
-use nerf::check::adam::begin;
-use nerf::kernels::training;
+use nerf::field::training;
+use nerf::verify::check::Setup;
+use nerf::verify::check::adam::begin;
 
 use crate::bench::workbench;
 use crate::close::assert_close;

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use nerf::check::{Forced, Setup, Subject, Tally, Workbench};
 use nerf::config::Accumulation;
+use nerf::field::layer::Product;
 use nerf::gpu::tensor::Memory;
 use nerf::gpu::{Gpu, adapter};
-use nerf::kernels::layer::Product;
+use nerf::verify::check::{Forced, Setup, Subject, Tally, Workbench};
 
 /// The adapter under test with these variants.
 pub(crate) fn subject_with(forced: Forced) -> Result<Subject> {

@@ -2,14 +2,14 @@
 //! can run.
 
 use anyhow::Result;
-use nerf::check::networks::{SHAPES, Shape, networks};
-use nerf::check::{
+use nerf::config::Accumulation;
+use nerf::field::layer::Product;
+use nerf::gpu::tensor::Memory;
+use nerf::verify::check::networks::{SHAPES, Shape, networks};
+use nerf::verify::check::{
     Forced, activation, adam, exponential, fused, grid, harmonics, lens, loss, marching, occupancy, random,
     rays, selection, step, view,
 };
-use nerf::config::Accumulation;
-use nerf::gpu::tensor::Memory;
-use nerf::kernels::layer::Product;
 
 use crate::bench::{modest_subject, passes, subject, subject_with};
 

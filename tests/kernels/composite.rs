@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use anyhow::Result;
-use nerf::check::draw::Random;
-use nerf::check::fused::{BOUND, Fused, golden_rays};
-use nerf::check::hard_rays::HardRay;
-use nerf::reference::Transmittance;
-use nerf::reference::vectors::GoldenFile;
+use nerf::verify::check::draw::Random;
+use nerf::verify::check::fused::{BOUND, Fused, golden_rays};
+use nerf::verify::check::hard_rays::HardRay;
+use nerf::verify::reference::Transmittance;
+use nerf::verify::reference::vectors::GoldenFile;
 
 use crate::bench::subject;
 use crate::close::assert_close;

@@ -2,11 +2,11 @@
 
 use anyhow::Result;
 use glam::DVec3;
-use nerf::check::draw::{Random, random_batch};
-use nerf::check::grid::encode;
-use nerf::check::{Forced, Setup};
 use nerf::config::Accumulation;
-use nerf::kernels::density;
+use nerf::field::density;
+use nerf::verify::check::draw::{Random, random_batch};
+use nerf::verify::check::grid::encode;
+use nerf::verify::check::{Forced, Setup};
 
 use crate::bench::{subject_with, workbench};
 

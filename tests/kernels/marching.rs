@@ -1,9 +1,9 @@
 //! Marching where there is nothing, or more than fits.
 
 use anyhow::Result;
-use nerf::check::Setup;
-use nerf::check::marching::Marching;
-use nerf::kernels::marching::SPARE_ROWS;
+use nerf::field::march::SPARE_ROWS;
+use nerf::verify::check::Setup;
+use nerf::verify::check::marching::Marching;
 
 use crate::bench::subject;
 

@@ -1,8 +1,8 @@
 //! The occupancy grid where nothing is seen, and at its largest.
 
 use anyhow::Result;
-use nerf::check::Setup;
-use nerf::kernels::occupancy::Update;
+use nerf::field::occupancy::Update;
+use nerf::verify::check::Setup;
 
 use crate::bench::workbench;
 

@@ -2,12 +2,12 @@
 
 use anyhow::Result;
 use glam::{DAffine3, DVec2, DVec3};
+use nerf::camera::Bounds;
 use nerf::camera::{Camera, Lens, LensKind};
-use nerf::check::Setup;
-use nerf::check::rays::{DeviceRay, begin_rays, pixel_camera};
-use nerf::dataset::Bounds;
-use nerf::kernels::viewing;
-use nerf::render::Renderer;
+use nerf::field::render::Renderer;
+use nerf::field::viewing;
+use nerf::verify::check::Setup;
+use nerf::verify::check::rays::{DeviceRay, begin_rays, pixel_camera};
 
 use crate::bench::workbench;
 use crate::close::assert_close;

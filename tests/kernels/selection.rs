@@ -1,10 +1,10 @@
 //! The selection where more samples are kept than fit.
 
 use anyhow::Result;
-use nerf::check::Setup;
-use nerf::check::draw::{Random, random_batch};
-use nerf::check::selection::Selecting;
-use nerf::kernels::marching::kept_capacity;
+use nerf::field::march::kept_capacity;
+use nerf::verify::check::Setup;
+use nerf::verify::check::draw::{Random, random_batch};
+use nerf::verify::check::selection::Selecting;
 
 use crate::bench::subject;
 

@@ -1,8 +1,8 @@
 //! Trainings of a tiny field over many steps.
 
 use anyhow::Result;
-use nerf::check::Setup;
-use nerf::check::step::{LEARNING_RATE, TinyTraining, setups};
+use nerf::verify::check::Setup;
+use nerf::verify::check::step::{LEARNING_RATE, TinyTraining, setups};
 
 use crate::bench::subject;
 use crate::close::assert_close;

@@ -2,8 +2,9 @@
 
 use glam::DVec2;
 use image::{ImageBuffer, ImageFormat, Rgba};
-use nerf::dataset::{AlphaMode, Reading};
-use nerf::image::{ExrPixels, Pixels, Precision, write_exr, write_png_rgba8};
+use nerf::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use nerf::photo::Pixels;
+use nerf::photo::{AlphaMode, Reading};
 
 use crate::{COUNT, Folder, HEIGHT, WIDTH, has_note, srgb8};
 

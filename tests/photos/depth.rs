@@ -1,8 +1,9 @@
 //! Depth files of every unit and size.
 
 use image::{DynamicImage, ImageBuffer, Luma};
-use nerf::dataset::{Dataset, Reading};
-use nerf::image::{ExrPixels, Precision, write_exr};
+use nerf::capture::dataset::Dataset;
+use nerf::capture::image::{ExrPixels, Precision, write_exr};
+use nerf::photo::Reading;
 
 use crate::{Folder, HEIGHT, WIDTH, has_note};
 

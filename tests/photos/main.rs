@@ -10,8 +10,10 @@ use glam::DVec2;
 use image::codecs::jpeg::JpegEncoder;
 use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage, ImageBuffer, ImageEncoder, ImageFormat, Luma, Rgb};
-use nerf::dataset::{Crop, Dataset, HoldOut, OpenOptions, Photo, Reading};
-use nerf::image::{BitDepth, Pixels, write_png_rgba8};
+use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions};
+use nerf::capture::image::write_png_rgba8;
+use nerf::photo::{BitDepth, Pixels};
+use nerf::photo::{Crop, Photo, Reading};
 
 const POSE: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]";
 const WIDTH: u32 = 12;

@@ -5,13 +5,13 @@ mod command;
 
 use glam::{DAffine3, DVec2, DVec3};
 use nerf::camera::{Camera, Lens};
-use nerf::dataset::spread_order;
-use nerf::depths::{Depths, Onlookers};
-use nerf::render::View;
-use nerf::report::log::Log;
-use nerf::report::pictures::{LONGEST_SIDE, Pair, Pictures};
-use nerf::report::views::{Outcome, TestViews, ViewScores};
-use nerf::report::{Facts, Report};
+use nerf::capture::dataset::spread_order;
+use nerf::field::render::View;
+use nerf::run::depths::{Depths, Onlookers};
+use nerf::run::report::log::Log;
+use nerf::run::report::pictures::{LONGEST_SIDE, Pair, Pictures};
+use nerf::run::report::views::{Outcome, TestViews, ViewScores};
+use nerf::run::report::{Facts, Report};
 
 /// A log with every kind of row, and a torn last line.
 const FULL: &str = r#"

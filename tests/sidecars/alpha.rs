@@ -3,7 +3,7 @@
 use super::driving::{checkpoint, folder, number, train};
 use super::{DECIDED, PLAIN, SIZE, STEPS, TOYS, all_images, are_equal, copy, remarks, repaint, srgb8, stem};
 use image::{GrayImage, RgbImage};
-use nerf::dataset::AlphaMode;
+use nerf::photo::AlphaMode;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 

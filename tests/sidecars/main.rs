@@ -10,7 +10,8 @@ mod ranges;
 mod reading;
 
 use driving::{SMOKE, checkpoint, folder, generated, nerf, number, text, train};
-use nerf::image::{ExrPixels, Image, Pixels, Precision, read_exr_channel, write_exr, write_png_rgba8};
+use nerf::capture::image::{ExrPixels, Precision, read_exr_channel, write_exr, write_png_rgba8};
+use nerf::photo::{Image, Pixels};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -2,8 +2,8 @@
 
 use super::driving::{checkpoint, folder, generated, nerf, number, object, text, train};
 use super::{SIZE, SMALL, TOYS, images, srgb8};
-use nerf::image::Image;
-use nerf::metrics::psnr;
+use nerf::photo::Image;
+use nerf::support::metrics::psnr;
 use std::fs;
 
 #[test]

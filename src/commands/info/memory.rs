@@ -4,14 +4,15 @@ use crate::commands::Session;
 use crate::commands::train::needs;
 use crate::commands::train::setup::{cameras, defaults};
 use anyhow::Result;
+use nerf::camera::Bounds;
 use nerf::camera::Camera;
+use nerf::capture::dataset::Dataset;
+use nerf::capture::health::Finding;
 use nerf::config::Config;
-use nerf::dataset::{Bounds, Dataset};
+use nerf::field::parameters::{Layout, finest_resolution};
+use nerf::field::{Needs, Plan, Traits};
 use nerf::gpu::banks::Capacity;
-use nerf::health::Finding;
-use nerf::kernels::{Needs, Plan, Traits};
-use nerf::memory::Memory;
-use nerf::model::{Layout, finest_resolution};
+use nerf::run::memory::Memory;
 
 /// What a training with the settings for its adapter takes.
 #[derive(Clone, Debug)]

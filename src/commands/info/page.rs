@@ -2,10 +2,10 @@
 
 use super::memory::Estimate;
 use super::{Report, problems};
-use nerf::dataset::Frame;
-use nerf::health::{Arrangement, Gaze, Severity, Spread};
-use nerf::image::BitDepth;
-use nerf::words::{bytes, count, length, percent, point, short};
+use nerf::capture::dataset::Frame;
+use nerf::capture::health::{Arrangement, Gaze, Severity, Spread};
+use nerf::photo::BitDepth;
+use nerf::support::format::{bytes, count, length, percent, point, short};
 
 /// Width of the headings at the left.
 const MARGIN: usize = 10;

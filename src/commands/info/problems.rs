@@ -1,7 +1,7 @@
 //! What is wrong with a dataset as it was read.
 
-use nerf::dataset::Dataset;
-use nerf::health::Finding;
+use nerf::capture::dataset::Dataset;
+use nerf::capture::health::Finding;
 
 /// Number of images that are there.
 pub(super) fn found(dataset: &Dataset) -> usize {

@@ -2,8 +2,8 @@
 
 use super::page::bits;
 use super::{Report, problems};
-use nerf::dataset::Frame;
-use nerf::health::{Arrangement, Finding, Severity, Spread};
+use nerf::capture::dataset::Frame;
+use nerf::capture::health::{Arrangement, Finding, Severity, Spread};
 use serde_json::{Value, json};
 
 impl Report<'_> {

@@ -1,7 +1,7 @@
 //! `log.jsonl`: one JSON object per line.
 
 use anyhow::{Context, Result};
-use nerf::file::write_atomically;
+use nerf::support::file::write_atomically;
 use serde_json::Value;
 use std::fs::{File, OpenOptions};
 use std::io::Write;

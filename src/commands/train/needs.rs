@@ -2,10 +2,10 @@
 
 use anyhow::{Result, ensure};
 use nerf::camera::LensKind;
+use nerf::capture::dataset::{Dataset, Frame, evenly_spaced};
 use nerf::config::Config;
-use nerf::dataset::{Dataset, Frame, evenly_spaced};
-use nerf::image::{BitDepth, Image};
-use nerf::kernels::Needs;
+use nerf::field::Needs;
+use nerf::photo::{BitDepth, Image};
 
 /// Photos that tell how bright a linear scene is.
 const PHOTOS_FOR_GREY: usize = 8;

@@ -2,10 +2,10 @@
 
 use super::stages::StageTimes;
 use anyhow::{Result, bail};
-use nerf::checkpoint::About;
 use nerf::config::Optimizer;
-use nerf::schedule::Budget;
-use nerf::train::{StepStats, Trainer};
+use nerf::config::schedule::Budget;
+use nerf::field::checkpoint::About;
+use nerf::field::train::{StepStats, Trainer};
 use std::time::Instant;
 
 /// Most steps of a block.

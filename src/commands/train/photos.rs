@@ -4,11 +4,11 @@ use super::setup::Setup;
 use crate::progress::Progress;
 use crate::remarks::Remarks;
 use anyhow::Result;
-use nerf::dataset::Dataset;
+use nerf::capture::dataset::Dataset;
+use nerf::field::views::Views;
 use nerf::gpu::Gpu;
-use nerf::memory::Memory;
-use nerf::views::Views;
-use nerf::words::{bytes, few};
+use nerf::run::memory::Memory;
+use nerf::support::format::{bytes, few};
 use std::sync::Arc;
 
 /// Whether there is room for the training and its photos, on the host and on the device.

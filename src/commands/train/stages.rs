@@ -2,7 +2,7 @@
 
 use nerf::gpu::Gpu;
 use nerf::gpu::timer::Timer;
-use nerf::report::log::Stage;
+use nerf::run::report::log::Stage;
 
 /// Of so many blocks, one is timed: its steps wait for the device each, which costs a little.
 const BLOCKS_PER_TIMED: u32 = 16;

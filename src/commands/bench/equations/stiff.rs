@@ -1,9 +1,9 @@
 //! Rays that are hard on arithmetic, with what the f64 reference makes of them.
 
-use nerf::check::draw::Random;
-use nerf::check::hard_rays::HardRay;
-use nerf::reference::Transmittance;
-use nerf::reference::vectors::GoldenFile;
+use nerf::verify::check::draw::Random;
+use nerf::verify::check::hard_rays::HardRay;
+use nerf::verify::reference::Transmittance;
+use nerf::verify::reference::vectors::GoldenFile;
 
 /// Rays of each kind.
 const RAYS: u32 = 16;
@@ -91,9 +91,9 @@ impl Family {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nerf::reference::composite::composite;
-    use nerf::reference::textbook::{Precision, textbook_d_s};
-    use nerf::reference::vectors::RayError;
+    use nerf::verify::reference::composite::composite;
+    use nerf::verify::reference::textbook::{Precision, textbook_d_s};
+    use nerf::verify::reference::vectors::RayError;
 
     const CONVENTIONS: [Transmittance; 2] = [Transmittance::Exclusive, Transmittance::Inclusive];
 

@@ -2,15 +2,15 @@
 
 use anyhow::{Context, Result, ensure};
 use glam::DVec3;
-use nerf::check::{Setup, Workbench};
 use nerf::config;
+use nerf::field::{color, training};
 use nerf::gpu::Gpu;
 use nerf::gpu::pass::Stage;
 use nerf::gpu::timer::Timer;
-use nerf::kernels::{color, training};
 use nerf::quadrature::Samples;
-use nerf::reference::Transmittance;
-use nerf::reference::model::{RaySample, TrainingRay};
+use nerf::verify::check::{Setup, Workbench};
+use nerf::verify::reference::Transmittance;
+use nerf::verify::reference::model::{RaySample, TrainingRay};
 use std::sync::Arc;
 
 /// The transmittance of the early stop, that of a training.
@@ -144,7 +144,7 @@ impl Device {
         let kept = counters.kept as usize;
         let colors: Vec<[f32; 3]> =
             rays.iter().flat_map(|ray| &ray.color).map(|color| color.map(|c| c as f32)).collect();
-        let color = |row: nerf::check::Kept| {
+        let color = |row: nerf::verify::check::Kept| {
             let [r, g, b] =
                 colors.get(row.sample as usize).context("a kept sample is none of those uploaded")?;
             Ok([*r, *g, *b, 0.0])

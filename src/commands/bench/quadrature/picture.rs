@@ -3,8 +3,8 @@
 use super::device::{Variant, name};
 use super::{Row, is_of};
 use anyhow::Result;
-use nerf::chart::{Axis, Chart, Mark, Series};
 use nerf::quadrature::Medium;
+use nerf::support::chart::{Axis, Chart, Mark, Series};
 use std::fmt::Write;
 
 /// Of one chart, in pixels.

@@ -6,8 +6,8 @@ use crate::commands::train::pace::Pace;
 use crate::progress::{Progress, duration};
 use crate::remarks::Remarks;
 use anyhow::{Context, Result};
-use nerf::report::log::Stage;
-use nerf::schedule::Budget;
+use nerf::config::schedule::Budget;
+use nerf::run::report::log::Stage;
 use serde::Serialize;
 
 /// Seconds of training up to the first measurement.

@@ -3,7 +3,7 @@
 use super::curve::Point;
 use super::{Run, by_config};
 use anyhow::Result;
-use nerf::chart::{Axis, Chart, Mark, Series};
+use nerf::support::chart::{Axis, Chart, Mark, Series};
 
 /// Lines that a reader can tell apart.
 const MOST_LINES: usize = 7;

@@ -1,0 +1,170 @@
+//! Opening a dataset: find its files, parse them, look for the images, split, and bound the scene.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail, ensure};
+
+use super::located::{Built, Present, locate};
+use super::notes::Notes;
+use super::samples::Samples;
+use super::transforms::{self, Entry};
+use super::{Dataset, HoldOut, OpenOptions, Split, splits};
+use crate::camera::Bounds;
+use crate::camera::Camera;
+use crate::capture::scene_box::Surroundings;
+use crate::photo::BitDepth;
+
+impl Dataset {
+    /// Opens a folder or a single .json file; of the images, all headers are read and a few are decoded.
+    ///
+    /// # Errors
+    /// When a file cannot be read or understood, when no listed image is there, or when the images cannot be
+    /// trained on together; messages name the file, or the frame and the key.
+    pub fn open(path: &Path, options: &OpenOptions) -> Result<Self> {
+        if let HoldOut::Every(every) = options.hold_out {
+            ensure!(every >= 2, "cannot hold out one frame in {every}: expected 2 or more, or none at all");
+        }
+        let mut notes = Notes::default();
+        let sources = sources(path, &mut notes)?;
+        let root = folder_of(&sources[0].1);
+        let mut located = Vec::new();
+        let mut scene_box = None;
+        let files: Vec<&Path> = sources.iter().map(|(_, path)| path.as_path()).collect();
+        let listings = transforms::read(&files, &mut notes)?;
+        let dialect = listings.first().map_or("", |listing| listing.dialect);
+        for ((split, _), listing) in sources.iter().zip(listings) {
+            // The training file speaks for the scene.
+            scene_box = scene_box.or(listing.scene_box);
+            located.extend(locate(listing, *split, &root, options.allow_missing, &mut notes)?);
+        }
+        let present = Present::new(located, &root, options, &mut notes)?;
+        let bit_depth = present.bit_depth(&mut notes)?;
+        let (listed, missing) = (present.listed, present.missing.clone());
+        let Built { frames, members, damaged } = present.build(&root, options, &mut notes)?;
+        let members: Vec<_> = members.iter().map(|(s, path)| (*s, path.as_path())).collect();
+        let mut splits = splits::assign(&members, options.hold_out, &mut notes);
+        thin_out(&mut splits.train, options.reading.max_images, &mut notes);
+        let used = if splits.train.is_empty() { (0..frames.len()).collect() } else { splits.train.clone() };
+        let has_images = missing.len() < listed;
+        let mut reading = options.reading.clone();
+        let samples = Samples {
+            frames: used.iter().map(|&i| &frames[i]).collect(),
+            bits: bit_depth,
+            skips_damaged: options.allow_missing,
+        };
+        reading.alpha = samples.alpha(&reading, &mut notes)?;
+        let surroundings = match has_images {
+            true => samples.surroundings(&reading)?,
+            false => Surroundings::Unknown,
+        };
+        let cameras: Vec<&Camera> = used.iter().map(|&i| &frames[i].camera).collect();
+        let bounds = Bounds::choose(&cameras, scene_box, surroundings, &mut notes);
+        Ok(Self {
+            root,
+            files: sources.into_iter().map(|(_, path)| path).collect(),
+            dialect: dialect.to_owned(),
+            frames,
+            train: splits.train,
+            val: splits.val,
+            test: splits.test,
+            listed,
+            missing,
+            damaged,
+            is_hdr: bit_depth == BitDepth::Float,
+            bit_depth,
+            reading,
+            is_cutout: surroundings == Surroundings::Empty,
+            notes: notes.finish(),
+            bounds,
+        })
+    }
+}
+
+/// Keeps at most so many frames to train on, evenly spaced.
+fn thin_out(train: &mut Vec<usize>, most: Option<usize>, notes: &mut Notes) {
+    let count = train.len();
+    if let Some(most) = most.filter(|&most| most < count) {
+        *train = splits::evenly_spaced(train, most);
+        notes.note(format!("{most} of {count} frames are trained on, evenly spaced, as asked"));
+    }
+}
+
+/// Reads the cameras of a single file, in its order, without looking for images: name and camera. Sizes
+/// come from the file, else `default_size` in pixels.
+pub fn read_cameras(path: &Path, default_size: [u32; 2]) -> Result<Vec<(String, Camera)>> {
+    let camera = |entry: Entry| {
+        let size = entry.declared_size().unwrap_or(default_size);
+        let camera = entry.intrinsics.camera(size, entry.world_from_camera).0;
+        (entry.file_path, camera)
+    };
+    let listings = transforms::read(&[path], &mut Notes::default())?;
+    Ok(listings.into_iter().flat_map(|listing| listing.frames).map(camera).collect())
+}
+
+/// The files to read, training first, each with the split it stands for.
+fn sources(path: &Path, notes: &mut Notes) -> Result<Vec<(Option<Split>, PathBuf)>> {
+    if path.is_file() {
+        let split = match path.file_name().and_then(|name| name.to_str()) {
+            Some("transforms_val.json") => Some(Split::Val),
+            Some("transforms_test.json") => Some(Split::Test),
+            _ => None,
+        };
+        return Ok(vec![(split, path.to_owned())]);
+    }
+    ensure!(
+        path.is_dir(),
+        "{} does not exist; expected a folder with a transforms.json, or a .json file",
+        path.display()
+    );
+    let present = |name: &str| Some(path.join(name)).filter(|path| path.is_file());
+    let split_files: Vec<_> = [Split::Train, Split::Val, Split::Test]
+        .into_iter()
+        .zip(["train", "val", "test"])
+        .filter_map(|(s, name)| Some((Some(s), present(&format!("transforms_{name}.json"))?)))
+        .collect();
+    let single = present("transforms.json");
+    let has_train = split_files.first().is_some_and(|file| file.0 == Some(Split::Train));
+    match (single, has_train) {
+        (Some(_), true) => {
+            notes.note("transforms.json is ignored, because there is a transforms_train.json");
+            Ok(split_files)
+        }
+        (Some(single), false) if split_files.is_empty() => Ok(vec![(None, single)]),
+        (Some(single), false) => {
+            let train = std::iter::once((Some(Split::Train), single));
+            Ok(train.chain(split_files).collect())
+        }
+        (None, _) if !split_files.is_empty() => Ok(split_files),
+        (None, _) => bail!(
+            "expected transforms.json or transforms_train.json in {}, found {}",
+            path.display(),
+            json_files(path)
+        ),
+    }
+}
+
+fn json_files(folder: &Path) -> String {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<_> = names.filter(|name| name.ends_with(".json")).collect();
+    names.sort();
+    match names.len() {
+        0 => "no .json file; convert your photos with COLMAP and one of its exporters".into(),
+        _ => format!("{}; name the file itself", names.join(", ")),
+    }
+}
+
+fn folder_of(file: &Path) -> PathBuf {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+impl Entry {
+    /// The size in whole pixels that the file declares.
+    pub(super) fn declared_size(&self) -> Option<[u32; 2]> {
+        let size = self.intrinsics.likely_size()?.round().max(glam::DVec2::ONE);
+        Some([size.x as u32, size.y as u32])
+    }
+}

@@ -1,0 +1,67 @@
+//! A few images of a dataset, decoded to tell what their alpha means.
+
+use anyhow::Result;
+use rayon::prelude::*;
+
+use super::Frame;
+use super::notes::Notes;
+use super::photo::How;
+use super::splits::evenly_spaced;
+use crate::capture::scene_box::Surroundings;
+use crate::photo::{AlphaMode, Reading};
+use crate::photo::{BitDepth, Evidence, Multiplied};
+
+/// Images that are looked at to tell what their alpha means.
+const MOST: usize = 4;
+
+/// The frames that samples are taken from.
+pub(super) struct Samples<'a> {
+    /// To train on, or all if there are none; never empty.
+    pub(super) frames: Vec<&'a Frame>,
+    pub(super) bits: BitDepth,
+    /// Whether images that cannot be decoded are passed over, instead of being an error.
+    pub(super) skips_damaged: bool,
+}
+
+impl Samples<'_> {
+    /// What alpha means: as asked, or as a few of the images show.
+    pub(super) fn alpha(&self, reading: &Reading, notes: &mut Notes) -> Result<AlphaMode> {
+        if reading.alpha != AlphaMode::Auto {
+            return Ok(reading.alpha);
+        }
+        if self.bits == BitDepth::Float {
+            return Ok(AlphaMode::Premultiplied);
+        }
+        let with_alpha: Vec<_> = self.frames.iter().filter(|frame| frame.has_own_alpha).collect();
+        let samples = evenly_spaced(&with_alpha, MOST);
+        let how = How { multiplied: Multiplied::Straight, ..How::new(self.bits, reading) };
+        let look = |frame: &&&Frame| match frame.upright(how) {
+            Ok(image) => Ok(image.evidence()),
+            Err(_) if self.skips_damaged => Ok(Evidence::default()),
+            Err(error) => Err(error),
+        };
+        let evidence: Vec<Evidence> = samples.par_iter().map(look).collect::<Result<_>>()?;
+        if !evidence.into_iter().fold(Evidence::default(), Evidence::and).is_premultiplied() {
+            return Ok(AlphaMode::Straight);
+        }
+        notes.note(
+            "no colour is above its alpha, though the opaque pixels are bright: the colours are taken for \
+             premultiplied with alpha; if their edges come out too bright, say --alpha straight",
+        );
+        Ok(AlphaMode::Premultiplied)
+    }
+
+    /// An alpha channel alone says little (screenshots have one), so the first image is looked at.
+    pub(super) fn surroundings(&self, reading: &Reading) -> Result<Surroundings> {
+        let how = How::new(self.bits, reading);
+        for frame in &self.frames {
+            match frame.has_alpha.then(|| frame.upright(how)).transpose() {
+                Ok(Some(image)) if image.is_cutout() => return Ok(Surroundings::Empty),
+                Ok(_) => return Ok(Surroundings::Background),
+                Err(_) if self.skips_damaged => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Surroundings::Unknown)
+    }
+}

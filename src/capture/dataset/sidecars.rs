@@ -1,0 +1,234 @@
+//! Files beside a photo that say more about its pixels: masks, alpha and depth.
+//!
+//! A mask says which pixels tell nothing; that is something else than alpha, which says where there is nothing.
+//! Tools do not agree on what the colours of a mask mean, so it depends on how a mask was found:
+//!
+//! | found by | ignored | convention of |
+//! | --- | --- | --- |
+//! | `mask_path` of the frame | black | nerfstudio |
+//! | folder `masks` beside the images' folder or in the dataset | black | brush, COLMAP |
+//! | `dynamic_mask_<stem>.png` beside the image | everything but black | instant-ngp |
+//!
+//! All that there are count, and a pixel that one of them ignores is ignored.
+
+use std::collections::{HashMap, HashSet};
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+
+use super::frames;
+use super::json::Fields;
+use super::notes::{Notes, Severity};
+use super::transforms::Entry;
+use crate::capture::image::Header;
+use crate::photo::BitDepth;
+
+/// A depth file as a frame lists it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthEntry {
+    /// The file, as the frame spells it, with forward slashes.
+    pub path: String,
+    /// World units per step of a file of whole numbers; `None` if the file does not say. Files of floats are
+    /// in world units already.
+    pub world_per_unit: Option<f64>,
+}
+
+/// The files beside one photo.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sidecars {
+    pub(super) masks: Vec<Mask>,
+    /// An image whose red channel is the photo's alpha.
+    pub(super) alpha: Option<PathBuf>,
+    pub(super) depth: Option<Depth>,
+}
+
+impl Sidecars {
+    /// Drops masks whose headers cannot be read, and says why they cannot.
+    pub(super) fn drop_damaged_masks(&mut self) -> Vec<anyhow::Error> {
+        let mut errors = Vec::new();
+        self.masks.retain(|mask| Header::read(&mask.path).map_err(|error| errors.push(error)).is_ok());
+        errors
+    }
+}
+
+/// A mask's file.
+#[derive(Clone, Debug)]
+pub(super) struct Mask {
+    pub(super) path: PathBuf,
+    pub(super) ignores: Ignores,
+}
+
+/// Which pixels of a mask mean that the photo's tell nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ignores {
+    Black,
+    AllButBlack,
+}
+
+/// A depth map's file.
+#[derive(Clone, Debug)]
+pub(super) struct Depth {
+    pub(super) path: PathBuf,
+    /// World units per step of whole numbers, where that is known.
+    pub(super) world_per_unit: Option<f64>,
+}
+
+/// What a frame lists: its mask, and its depth.
+pub(super) fn listed(frame: Fields, file: Fields) -> Result<(Option<String>, Option<DepthEntry>)> {
+    let name = |key| Ok::<_, anyhow::Error>(frame.text(key)?.map(|path| path.replace('\\', "/")));
+    let positive = |key: &str| {
+        let in_frame = frame.positive(key, f64::INFINITY)?;
+        Ok::<_, anyhow::Error>(in_frame.or(file.positive(key, f64::INFINITY)?))
+    };
+    // Datasets for dense depth priors state the steps per world unit instead.
+    let stated = match positive("depth_unit_scale_factor")? {
+        None => positive("depth_scaling_factor")?.map(f64::recip).or(positive("integer_depth_scale")?),
+        stated => stated,
+    };
+    let depth = match (name("depth_file_path")?, name("depth_path")?) {
+        // nerfstudio's depth is in millimetres unless it is told otherwise.
+        (Some(path), _) => Some(DepthEntry { path, world_per_unit: stated.or(Some(1e-3)) }),
+        (None, Some(path)) => Some(DepthEntry { path, world_per_unit: stated }),
+        (None, None) => None,
+    };
+    Ok((name("mask_path")?, depth))
+}
+
+/// Looks for the files beside photos; reads every folder once.
+pub(super) struct Finder<'a> {
+    root: &'a Path,
+    folders: HashMap<PathBuf, HashSet<OsString>>,
+    /// A folder `masks` and the first photo that has none in it.
+    unmatched: Option<(PathBuf, PathBuf)>,
+}
+
+impl<'a> Finder<'a> {
+    /// For the dataset in the folder `root`.
+    pub(super) fn new(root: &'a Path) -> Self {
+        Self { root, folders: HashMap::new(), unmatched: None }
+    }
+
+    /// The files beside the photo of `entry`, which was found at `image`.
+    pub(super) fn find(&mut self, entry: &Entry, image: &Path, notes: &mut Notes) -> Sidecars {
+        let mut masks = Vec::new();
+        if let Some(listed) = &entry.mask_path {
+            match frames::locate(self.root, listed) {
+                Some((path, _)) => masks.push(Mask { path, ignores: Ignores::Black }),
+                None => notes.frame(
+                    Severity::Warning,
+                    &entry.label,
+                    "the mask that `mask_path` names is missing; the frame is used without it",
+                ),
+            }
+        }
+        let in_folder = self.in_masks_folder(image);
+        masks.extend(in_folder.map(|path| Mask { path, ignores: Ignores::Black }));
+        masks.dedup_by(|a, b| same(&a.path, &b.path));
+        let dynamic = named(image, |stem| joined([OsStr::new("dynamic_mask_"), stem, OsStr::new(".png")]));
+        if let Some(path) = dynamic.filter(|path| self.is_there(path)) {
+            masks.push(Mask { path, ignores: Ignores::AllButBlack });
+        }
+        Sidecars { masks, alpha: self.alpha(image), depth: self.depth(entry, notes) }
+    }
+
+    /// `masks/<name>` beside one of the folders that the image is in or in the dataset's; the name with or
+    /// without the images' folder, with any extension in place of the image's or after it.
+    fn in_masks_folder(&mut self, image: &Path) -> Option<PathBuf> {
+        let is_below_root = image.starts_with(self.root);
+        let root = self.root;
+        let own = image.parent()?;
+        for folder in image.ancestors().skip(1) {
+            let is_last = folder == root || (!is_below_root && Some(folder) == own.parent());
+            let masks = folder.join("masks");
+            if (folder != own || is_last) && self.is_there(&masks) {
+                let whole = image.strip_prefix(folder).ok()?;
+                let mut parts = whole.components();
+                parts.next();
+                let names = [whole, parts.as_path()].into_iter().filter(|name| !name.as_os_str().is_empty());
+                let beside = names.map(|name| masks.join(name));
+                // `0001.jpg`, `0001.jpg.png`, then `0001.png`.
+                let mut spellings = beside.flat_map(|path| {
+                    let stem = path.with_extension("");
+                    frames::candidates(&path).chain(frames::candidates(&stem).skip(1))
+                });
+                let found = spellings.find(|path| path != image && self.is_there(path));
+                if found.is_some() {
+                    return found;
+                }
+                if !image.starts_with(&masks) {
+                    self.unmatched.get_or_insert_with(|| (masks, image.to_owned()));
+                }
+            }
+            if is_last {
+                break;
+            }
+        }
+        None
+    }
+
+    /// Where no photo has a mask though there is a folder of them: how they are named, and how they should be.
+    pub(super) fn unmatched_masks(&self) -> Option<String> {
+        let (masks, image) = self.unmatched.as_ref()?;
+        let names = std::fs::read_dir(masks).ok()?.flatten().map(|entry| entry.file_name());
+        let first =
+            names.map(|name| name.to_string_lossy().into_owned()).filter(|name| !name.starts_with('.'));
+        Some(format!(
+            "no mask in {} is named like a photo: found {}, expected {}.png for {}; no mask is used; name each mask like \
+             its photo",
+            masks.display(),
+            first.min()?,
+            image.file_stem()?.to_string_lossy(),
+            image.file_name()?.to_string_lossy()
+        ))
+    }
+
+    /// `<image>.alpha.<extension>`, the image named with its extension or without.
+    fn alpha(&mut self, image: &Path) -> Option<PathBuf> {
+        let extension = image.extension()?;
+        let end = joined([OsStr::new(".alpha."), extension]);
+        let long = image.with_file_name(joined([image.file_name()?, &end]));
+        let short = named(image, |stem| joined([stem, &end]))?;
+        [long, short].into_iter().find(|path| self.is_there(path))
+    }
+
+    fn depth(&self, entry: &Entry, notes: &mut Notes) -> Option<Depth> {
+        let listed = entry.depth.as_ref()?;
+        let Some((path, _)) = frames::locate(self.root, &listed.path) else {
+            notes.frame(Severity::Warning, &entry.label, "its depth file is missing");
+            return None;
+        };
+        // A header that cannot be read is one of a TIFF with a single channel of floats, or comes up on loading.
+        let counts_steps = || Header::read(&path).is_ok_and(|header| header.bits != BitDepth::Float);
+        if listed.world_per_unit.is_none() && counts_steps() {
+            let message = "the depth file has whole numbers, but no `integer_depth_scale` says how long a step \
+                           is; it is not used";
+            notes.frame(Severity::Warning, &entry.label, message);
+            return None;
+        }
+        Some(Depth { path, world_per_unit: listed.world_per_unit })
+    }
+
+    fn is_there(&mut self, path: &Path) -> bool {
+        let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return false };
+        if !self.folders.contains_key(folder) {
+            let shown = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+            let entries = std::fs::read_dir(shown).into_iter().flatten().flatten();
+            self.folders.insert(folder.to_owned(), entries.map(|entry| entry.file_name()).collect());
+        }
+        self.folders.get(folder).is_some_and(|names| names.contains(name))
+    }
+}
+
+fn joined<const N: usize>(parts: [&OsStr; N]) -> OsString {
+    parts.into_iter().collect()
+}
+
+/// The file beside `image` whose name is made of the image's stem.
+fn named(image: &Path, name: impl FnOnce(&OsStr) -> OsString) -> Option<PathBuf> {
+    Some(image.with_file_name(name(image.file_stem()?)))
+}
+
+fn same(a: &Path, b: &Path) -> bool {
+    a == b || a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
+}

@@ -1,0 +1,133 @@
+//! What is healthy or wrong about a dataset, seen from its cameras and pixels before anything is trained.
+//!
+//! [`Survey`] looks at cameras and scene box, [`photos::Look`] at one photo and [`photos::Gallery`] at all of them,
+//! and [`map`] draws the cameras. Every [`Finding`] says what is wrong, how it was seen, and what to do.
+
+mod axes;
+mod coverage;
+mod finding;
+mod gaze;
+pub mod map;
+mod optics;
+pub mod photos;
+mod poses;
+
+pub use coverage::Coverage;
+pub use finding::{Finding, Severity, Spread};
+pub use gaze::{Arrangement, Gaze};
+pub use optics::Optics;
+
+use crate::camera::Camera;
+use crate::capture::dataset::Dataset;
+use crate::capture::focus::{Axis, Focus, find};
+use glam::DVec3;
+use photos::Gallery;
+
+/// What the cameras of a dataset tell.
+#[derive(Clone, Debug)]
+pub struct Survey {
+    /// Indices of the frames that were looked at: one per image, where several splits list it.
+    pub views: Vec<usize>,
+    /// Where the cameras look.
+    pub gaze: Gaze,
+    /// How much of the scene box they see.
+    pub coverage: Coverage,
+    /// Focal lengths, sizes and lenses.
+    pub optics: Optics,
+    /// Pairs of frames with different images and the same pose.
+    pub same_pose: Vec<[usize; 2]>,
+    /// What looks wrong, worst first.
+    pub findings: Vec<Finding>,
+}
+
+impl Survey {
+    /// Looks at all frames of a dataset, of which there is at least one.
+    #[must_use]
+    pub fn of(dataset: &Dataset) -> Self {
+        let scene = Scene::new(dataset);
+        let gaze = Gaze::of(&scene);
+        let coverage = Coverage::of(&scene);
+        let optics = Optics::of(&scene);
+        let misread = axes::examine(&scene, &gaze);
+        let mut findings = Vec::new();
+        if misread.is_empty() {
+            // Where all poses are read the wrong way, single ones tell nothing.
+            findings.extend(poses::outliers(&scene, &gaze));
+            findings.extend(gaze.findings(&scene));
+            findings.extend(coverage.findings(&scene));
+        }
+        findings.extend(misread);
+        findings.extend(optics.findings(&scene));
+        findings.sort_by_key(|finding| finding.severity);
+        let same_pose = poses::repeated(&scene);
+        Self { views: scene.views, gaze, coverage, optics, same_pose, findings }
+    }
+
+    /// What stands out among the photos, of those that were looked at.
+    #[must_use]
+    pub fn findings_with(&self, gallery: Option<&Gallery>, dataset: &Dataset) -> Vec<Finding> {
+        let Some(gallery) = gallery else {
+            return poses::about_repeated(dataset, &self.same_pose, None).into_iter().collect();
+        };
+        let (differing, alike) =
+            self.same_pose.iter().partition::<Vec<[usize; 2]>, _>(|&&pair| gallery.differ(pair));
+        let mut findings = gallery.findings(dataset);
+        findings.extend(poses::about_repeated(dataset, &differing, Some(true)));
+        findings.extend(poses::about_repeated(dataset, &alike, Some(false)));
+        findings
+    }
+}
+
+/// The dataset as its examinations see it.
+struct Scene<'a> {
+    dataset: &'a Dataset,
+    /// Indices of the frames, each image once.
+    views: Vec<usize>,
+    /// One per view.
+    axes: Vec<Axis>,
+    focus: Focus,
+}
+
+impl<'a> Scene<'a> {
+    fn new(dataset: &'a Dataset) -> Self {
+        let views = dataset.distinct_images();
+        let axes: Vec<Axis> = views.iter().map(|&index| Axis::of(&dataset.frames[index].camera)).collect();
+        let focus = find(&axes);
+        Self { dataset, views, axes, focus }
+    }
+
+    fn cameras(&self) -> impl Iterator<Item = &'a Camera> {
+        self.views.iter().map(|&index| &self.dataset.frames[index].camera)
+    }
+
+    fn count(&self) -> usize {
+        self.views.len()
+    }
+
+    /// Largest distance of a camera from the middle of all, in world units.
+    fn extent(&self) -> f64 {
+        let mean = self.axes.iter().map(|axis| axis.origin).sum::<DVec3>() / self.count() as f64;
+        self.axes.iter().map(|axis| axis.origin.distance(mean)).fold(0.0, f64::max)
+    }
+
+    /// The views for which something holds.
+    fn which(&self, holds: impl Fn(usize) -> bool) -> Vec<usize> {
+        (0..self.count()).filter(|&view| holds(view)).map(|view| self.views[view]).collect()
+    }
+
+    /// The names of frames, the first few of many.
+    fn names(&self, frames: &[usize]) -> String {
+        names(self.dataset, frames)
+    }
+}
+
+/// `a.png, b.png, c.png and 4 more`.
+fn names(dataset: &Dataset, frames: &[usize]) -> String {
+    const MOST: usize = 3;
+    let shown = if frames.len() == MOST + 1 { MOST + 1 } else { MOST };
+    let named: Vec<_> = frames.iter().take(shown).map(|&index| dataset.frames[index].name.as_str()).collect();
+    match frames.len().saturating_sub(shown) {
+        0 => named.join(", "),
+        more => format!("{} and {more} more", named.join(", ")),
+    }
+}

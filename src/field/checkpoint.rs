@@ -1,0 +1,394 @@
+//! Checkpoints: a field, the state of its training, and everything needed to render it without its dataset.
+//!
+//! One safetensors file. Tensors: the parameters and Adam's moments (`table`: `[entries, 2]`,
+//! `table_moments`: `[entries, 4]`, `mlp*`: `[quads, 4]`), `occupancy` (`[cascades, cells, cells, cells]`) and
+//! `occupancy_bits`. The metadata entry [`KEY`] holds [`About`] as JSON.
+
+use crate::camera::Bounds;
+use crate::camera::orbit::Orbit;
+use crate::config::Config;
+use crate::config::schedule::Budget;
+use crate::field::Needs;
+use crate::field::parameters::{FEATURES, Layout};
+use crate::field::train::State;
+use crate::field::training::STATE;
+use crate::photo::{Reading, Split};
+use crate::support::file::write_atomically;
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::HashMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The layout of the file that this version writes and reads.
+pub const FORMAT: u64 = 2;
+/// The key of the metadata entry.
+pub const KEY: &str = "nerf";
+/// The file's name in the folder of a training.
+pub const FILE: &str = "checkpoint.safetensors";
+
+const BITS: &str = "occupancy_bits";
+
+/// A trained field and where its training stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
+    /// What it is.
+    pub about: About,
+    /// Parameters, moments and occupancy.
+    pub state: State,
+}
+
+/// What a checkpoint says about itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct About {
+    /// Always [`FORMAT`].
+    pub format: u64,
+    /// The dataset as it was named.
+    pub dataset: String,
+    /// The adapter trained on.
+    pub adapter: String,
+    /// Steps taken.
+    pub step: u32,
+    /// Rays of the next step.
+    pub rays: u32,
+    /// By how much the steps along its rays are longer than the configuration's, as a share of them.
+    #[serde(default)]
+    pub step_excess: f32,
+    /// Seconds of training; 0 of a deterministic one.
+    pub seconds: f64,
+    /// When the training is to end.
+    pub budget: Budget,
+    /// The resolved configuration; `grid.finest` is never 0.
+    pub config: Config,
+    /// The scene's box in world space.
+    pub bounds: Bounds,
+    /// What the kernels were linked with.
+    pub needs: Needs,
+    /// How the photos were read.
+    pub reading: Reading,
+    /// Which frames were trained on, and which were not.
+    pub splits: Splits,
+    /// Median width and height of the training images, in pixels.
+    pub image_size: [u32; 2],
+    /// Whether the training images have transparent pixels.
+    pub has_alpha: bool,
+    /// The circle to see the scene from.
+    pub orbit: Orbit,
+}
+
+/// Names of the frames of each split.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Splits {
+    /// Trained on.
+    pub train: Vec<String>,
+    /// Set aside to choose settings by.
+    pub val: Vec<String>,
+    /// Measured on.
+    pub test: Vec<String>,
+}
+
+impl Splits {
+    /// The names of one split.
+    #[must_use]
+    pub fn names(&self, split: Split) -> &[String] {
+        match split {
+            Split::Train => &self.train,
+            Split::Val => &self.val,
+            Split::Test => &self.test,
+        }
+    }
+}
+
+/// Settings that earlier trainings had, which rendering does not need and training no longer knows.
+const RETIRED: [(&str, &str); 3] =
+    [("selection", "keep_probability"), ("occupancy", "warm_up"), ("occupancy", "stride")];
+
+impl About {
+    /// The layout of the parameters.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        Layout::new(&self.config, self.config.grid.finest)
+    }
+
+    /// The shape of a tensor of the state.
+    fn shape(&self, layout: &Layout, name: &str) -> Vec<usize> {
+        let cells = self.config.occupancy.cells as usize;
+        match name {
+            "occupancy" => vec![self.needs.cascades as usize, cells, cells, cells],
+            BITS => vec![self.needs.cascades as usize * cells.pow(3) / 32],
+            "table" => vec![layout.entries, FEATURES],
+            "table_moments" => vec![layout.entries, 2 * FEATURES],
+            _ => vec![layout.quads, 4],
+        }
+    }
+
+    fn parse(text: &str) -> Result<Self> {
+        let mut value: Value = serde_json::from_str(text).context("its description is not JSON")?;
+        match value["format"].as_u64() {
+            Some(FORMAT) => {}
+            Some(other) => {
+                bail!(
+                    "expected format {FORMAT}, found {other}: another version of nerf wrote it; render it \
+                     with that version, or train again"
+                )
+            }
+            None => bail!("its description has no format number"),
+        }
+        for (group, key) in RETIRED {
+            if let Some(settings) = value["config"][group].as_object_mut() {
+                settings.remove(key);
+            }
+        }
+        let about: Self = serde_json::from_value(value).context("its description is not understood")?;
+        about.config.validate().context("its configuration")?;
+        ensure!(about.config.grid.finest > 0, "its configuration leaves grid.finest open");
+        let Needs { cascades, .. } = about.needs;
+        ensure!((1..=8).contains(&cascades), "expected 1 to 8 cascades, found {cascades}");
+        ensure!(about.bounds.half.is_finite() && about.bounds.half > 0.0, "its scene box is empty");
+        Ok(about)
+    }
+}
+
+impl Checkpoint {
+    /// Writes the file, or leaves the one that is there alone.
+    ///
+    /// # Errors
+    /// When a number is not finite, or the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let layout = self.about.layout();
+        let mut tensors = Vec::new();
+        for (name, values) in STATE.iter().zip(&self.state.buffers) {
+            let shape = self.about.shape(&layout, name);
+            let count: usize = shape.iter().product();
+            let values = values.get(..count).with_context(|| {
+                format!("the tensor '{name}' has {} numbers, and {count} are expected", values.len())
+            })?;
+            check_finite(name, values)?;
+            tensors.push((*name, TensorView::new(Dtype::F32, shape, bytemuck::cast_slice(values))?));
+        }
+        let bits = bytemuck::cast_slice(&self.state.occupancy_bits);
+        tensors.push((BITS, TensorView::new(Dtype::U32, self.about.shape(&layout, BITS), bits)?));
+        let about = serde_json::to_string(&self.about)?;
+        let metadata = HashMap::from([(KEY.to_owned(), about)]);
+        let bytes = safetensors::serialize(tensors, Some(metadata))?;
+        write_atomically(path, |file| Ok(file.write_all(&bytes)?))
+    }
+
+    /// Reads the file and checks it against its own description.
+    ///
+    /// # Errors
+    /// When it is missing, not a checkpoint, of another version, cut short or damaged.
+    pub fn load(path: &Path) -> Result<Self> {
+        let name = path.display();
+        let bytes = std::fs::read(path).with_context(|| format!("reading the checkpoint {name}"))?;
+        Self::parse(&bytes).with_context(|| format!("the checkpoint {name} cannot be used"))
+    }
+
+    fn parse(bytes: &[u8]) -> Result<Self> {
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|error| explain(&error, bytes))?;
+        let about = metadata.metadata().as_ref().and_then(|entries| entries.get(KEY));
+        let about = about.context("it is a safetensors file, but `nerf train` did not write it")?;
+        let about = About::parse(about)?;
+        let tensors = SafeTensors::deserialize(bytes)?;
+        let layout = about.layout();
+        let data = |name: &str, dtype: Dtype| {
+            let expected = about.shape(&layout, name);
+            let tensor = tensors.tensor(name).map_err(|_| anyhow!("the tensor '{name}' is missing"))?;
+            ensure!(
+                tensor.dtype() == dtype && tensor.shape() == expected,
+                "the tensor '{name}' should be {dtype:?} {expected:?}, found {:?} {:?}",
+                tensor.dtype(),
+                tensor.shape()
+            );
+            Ok(tensor.data())
+        };
+        let buffer = |name: &&str| {
+            let values: Vec<f32> = bytemuck::pod_collect_to_vec(data(name, Dtype::F32)?);
+            check_finite(name, &values)?;
+            Ok(values)
+        };
+        let buffers = STATE.iter().map(buffer).collect::<Result<_>>()?;
+        let occupancy_bits = bytemuck::pod_collect_to_vec(data(BITS, Dtype::U32)?);
+        let state = State {
+            step: about.step,
+            rays: about.rays,
+            step_excess: about.step_excess,
+            buffers,
+            occupancy_bits,
+        };
+        Ok(Self { about, state })
+    }
+}
+
+/// The checkpoint that a folder of a training, or a path to the file itself, stands for.
+///
+/// # Errors
+/// When there is none; the message says where it was looked for.
+pub fn locate(path: &Path) -> Result<PathBuf> {
+    if path.is_dir() {
+        let file = path.join(FILE);
+        ensure!(
+            file.is_file(),
+            "the folder {} has no {FILE}; expected the folder that `nerf train --out` wrote",
+            path.display()
+        );
+        return Ok(file);
+    }
+    ensure!(
+        path.is_file(),
+        "{} does not exist; expected the folder that `nerf train --out` wrote, or a checkpoint in it",
+        path.display()
+    );
+    Ok(path.to_owned())
+}
+
+fn explain(error: &SafeTensorError, bytes: &[u8]) -> anyhow::Error {
+    let found = bytes.len();
+    match error {
+        SafeTensorError::HeaderTooSmall | SafeTensorError::MetadataIncompleteBuffer => {
+            anyhow!(
+                "it is cut short or damaged: found {found} bytes, and its header describes another length"
+            )
+        }
+        SafeTensorError::InvalidHeaderLength if bytes.get(8) == Some(&b'{') => {
+            anyhow!("it is cut short: found {found} bytes, not even its header")
+        }
+        other => {
+            anyhow!("expected a safetensors file written by `nerf train`, found something else ({other})")
+        }
+    }
+}
+
+fn check_finite(name: &str, values: &[f32]) -> Result<()> {
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(index) => bail!(
+            "the tensor '{name}' has a value that is not finite ({} at {index}): the training diverged; \
+             start again with a smaller optimizer.learning_rate",
+            values[index]
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn checkpoint() -> Checkpoint {
+        let mut config = Config::default();
+        let small = r#"{"grid": {"levels": 8, "finest": 40, "log2_table": 8}, "occupancy": {"cells": 16}}"#;
+        config.merge(&serde_json::from_str(small).expect("JSON")).expect("valid");
+        let bounds = Bounds { center: DVec3::new(0.1, 0.2, 0.3), half: 1.5, cascades: 1, source: "x".into() };
+        let needs = Needs { alpha: true, cameras: 3, ..Needs::default() };
+        let about = About {
+            format: FORMAT,
+            dataset: "data/toys".into(),
+            adapter: "a test".into(),
+            step: 12,
+            rays: 345,
+            step_excess: 0.25,
+            seconds: 6.75,
+            budget: Budget { steps: Some(100), seconds: None },
+            config,
+            bounds,
+            needs,
+            reading: Reading { downscale: 2, ..Reading::default() },
+            splits: Splits { train: vec!["a".into()], ..Splits::default() },
+            image_size: [30, 20],
+            has_alpha: true,
+            orbit: Orbit::of(&[], DVec3::ZERO),
+        };
+        let layout = about.layout();
+        let values = |name: &&str| {
+            let count: usize = about.shape(&layout, name).iter().product();
+            (0..count).map(|i| i as f32 * 0.25 - 3.0).collect()
+        };
+        let buffers = STATE.iter().map(values).collect();
+        let state =
+            State { step: 12, rays: 345, step_excess: 0.25, buffers, occupancy_bits: vec![0xdead_beef; 128] };
+        Checkpoint { about, state }
+    }
+
+    fn saved() -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join(FILE);
+        checkpoint().save(&path).expect("writable");
+        (folder, path)
+    }
+
+    fn complaint(path: &Path) -> String {
+        format!("{:#}", Checkpoint::load(path).expect_err("refused"))
+    }
+
+    #[test]
+    fn what_is_saved_is_loaded() {
+        let (folder, path) = saved();
+        assert_eq!(Checkpoint::load(&path).expect("readable"), checkpoint());
+        assert_eq!(locate(folder.path()).expect("there"), path);
+        assert_eq!(locate(&path).expect("there"), path);
+    }
+
+    #[test]
+    fn other_files_and_parts_of_one_are_refused() {
+        let (folder, path) = saved();
+        let bytes = std::fs::read(&path).expect("readable");
+        for length in [0, 5, 100, bytes.len() / 2, bytes.len() - 1] {
+            std::fs::write(&path, &bytes[..length]).expect("writable");
+            assert!(complaint(&path).contains("cut short"), "{length}: {}", complaint(&path));
+        }
+        std::fs::write(&path, "just some text that is no checkpoint").expect("writable");
+        assert!(complaint(&path).contains("expected a safetensors file"), "{}", complaint(&path));
+        std::fs::remove_file(&path).expect("removable");
+        assert!(complaint(&path).contains("reading the checkpoint"));
+        assert!(locate(folder.path()).is_err() && locate(&path).is_err());
+    }
+
+    #[test]
+    fn settings_of_earlier_trainings_are_left_out() {
+        let about = checkpoint().about;
+        let mut value = serde_json::to_value(&about).expect("JSON");
+        for (group, key) in RETIRED {
+            value["config"][group][key] = 0.5.into();
+        }
+        assert_eq!(About::parse(&value.to_string()).expect("known"), about);
+        value["config"]["occupancy"]["unheard_of"] = 1.into();
+        assert!(About::parse(&value.to_string()).is_err());
+    }
+
+    #[test]
+    fn another_version_or_size_is_refused() {
+        let (_folder, path) = saved();
+        let text = |about: &About| serde_json::to_string(about).expect("JSON");
+        let about = checkpoint().about;
+        let newer = About { format: FORMAT + 1, ..about.clone() };
+        assert!(format!("{:#}", About::parse(&text(&newer)).expect_err("newer")).contains("found 3"));
+        let bytes = std::fs::read(&path).expect("readable");
+        let (from, to) = (r#"\"log2_table\":8"#, r#"\"log2_table\":9"#);
+        let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect("there");
+        let mut other = bytes;
+        other[at..at + to.len()].copy_from_slice(to.as_bytes());
+        std::fs::write(&path, other).expect("writable");
+        assert!(complaint(&path).contains("the tensor 'table' should be"), "{}", complaint(&path));
+    }
+
+    #[test]
+    fn what_is_not_finite_is_neither_saved_nor_loaded() {
+        let (_folder, path) = saved();
+        let mut diverged = checkpoint();
+        let weights = STATE.iter().position(|&name| name == "mlp").expect("the networks");
+        diverged.state.buffers[weights][7] = f32::NAN;
+        let error = format!("{:#}", diverged.save(&path).expect_err("diverged"));
+        assert!(error.contains("'mlp'") && error.contains("NaN at 7"), "{error}");
+        let mut bytes = std::fs::read(&path).expect("readable");
+        assert!(Checkpoint::parse(&bytes).is_ok(), "the good one is still there");
+        let header = u64::from_le_bytes(*bytes.first_chunk().expect("a length")) as usize;
+        bytes[8 + header..][..4].copy_from_slice(&f32::INFINITY.to_le_bytes());
+        std::fs::write(&path, bytes).expect("writable");
+        assert!(complaint(&path).contains("not finite"), "{}", complaint(&path));
+    }
+}

@@ -1,0 +1,96 @@
+//! What a plan needs on the device, told before anything is allocated.
+
+use super::{Plan, Traits, Workspace, color, density, march, occupancy, training, viewing};
+use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
+use crate::gpu::tensor::Element;
+use anyhow::{Result, anyhow};
+
+impl Plan {
+    /// Whether the adapter can run a training of this plan and render its views.
+    ///
+    /// # Errors
+    /// When it cannot: says what it lacks, and what to change.
+    pub fn check(&self, gpu: &Gpu) -> Result<()> {
+        Traits::of(gpu).check(self.accumulation, &gpu.info.name)?;
+        let demands =
+            self.training_demands(self.cell_count()).into_iter().chain(self.for_views().viewing_demands());
+        for demand in demands {
+            demand
+                .check(gpu)
+                .map_err(|error| anyhow!("{error}; use a smaller {}", setting_of(demand.name)))?;
+        }
+        Ok(())
+    }
+
+    /// Everything but the photos that a training needs, which visits `visible` cells of its occupancy grid.
+    #[must_use]
+    pub fn training_demands(&self, visible: usize) -> Vec<Demand> {
+        [
+            march::demands(self),
+            density::parameter_demands(self),
+            density::demands(self),
+            color::demands(self),
+            training::demands(self),
+            occupancy::demands(visible),
+        ]
+        .concat()
+    }
+
+    /// The plan of a renderer, whose budget does not depend on the training's: every sample may get colour.
+    #[must_use]
+    pub fn for_views(&self) -> Self {
+        let mut plan = self.clone();
+        let batch = &mut plan.config.batch;
+        batch.rays = self.rounds.rays;
+        batch.samples = self.rounds.samples.max(self.rounds.rays);
+        batch.kept = batch.samples;
+        plan
+    }
+
+    /// What rendering needs besides the parameters, as the plan of a renderer.
+    #[must_use]
+    pub fn viewing_demands(&self) -> Vec<Demand> {
+        [march::demands(self), density::demands(self), color::demands(self), viewing::demands(self)].concat()
+    }
+
+    /// A tensor in the plan's memory.
+    pub(super) fn tensor(&self, name: &'static str, element: Element, count: usize) -> Demand {
+        Demand::tensor(name, element, count, self.memory)
+    }
+
+    /// One tensor of `rows` rows per hidden layer of the colour network.
+    pub(super) fn color_hidden(&self, names: &'static [&'static str], rows: usize) -> Vec<Demand> {
+        let count = rows * self.config.network.width / 4;
+        let layers = self.config.network.color_layers;
+        names.iter().take(layers).map(|name| self.tensor(name, Element::Vec4, count)).collect()
+    }
+}
+
+/// The setting that a buffer's size follows from.
+fn setting_of(name: &str) -> &'static str {
+    match name {
+        "table" | "table_moments" | "d_table" => "table (grid.log2_table)",
+        "occupancy" | "occupancy_bits" | "visible_cells" => "occupancy grid (occupancy.cells)",
+        "mlp" | "mlp_first" | "mlp_second" | "d_weights" | "d_weight_chunks" => {
+            "network (network.width, network.color_layers)"
+        }
+        "ray_lines" | "ray_steps" | "ray_spans" | "kept_spans" | "ray_tails" | "ray_targets"
+        | "ray_results" => "batch (batch.rays)",
+        _ => "batch (batch.samples, and batch.kept with it) or network (network.width)",
+    }
+}
+
+impl Workspace {
+    /// Room for a training that visits the cells `visible` of its occupancy grid; the photos are added later.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold it.
+    pub fn for_training(gpu: &Gpu, plan: &Plan, visible: &[u32]) -> Result<Self> {
+        let mut workspace = Self::default();
+        workspace.allocate(gpu, &plan.training_demands(visible.len()))?;
+        workspace.write(gpu, "levels", &plan.layout.levels);
+        workspace.write(gpu, "visible_cells", visible);
+        Ok(workspace)
+    }
+}

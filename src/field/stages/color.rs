@@ -1,0 +1,72 @@
+//! Choosing the samples that matter, and the colour network over them.
+
+use crate::field::density::{forward, layer_stage};
+use crate::field::march::{SPARE_ROWS, Scanned, kept_capacity, scan};
+use crate::field::parameters::COLOR_INPUTS;
+use crate::field::{Link, Plan, Workspace, dispatch, viewing};
+use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
+use crate::gpu::pass::{Size, Stage};
+use crate::gpu::tensor::Element;
+use anyhow::Result;
+
+/// Names of the activations behind each hidden layer of the colour network.
+pub const COLOR_HIDDEN: [&str; 4] = ["color_hidden_1", "color_hidden_2", "color_hidden_3", "color_hidden_4"];
+
+/// How many samples get colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Selection {
+    /// Those above the weight floor, and some of the others.
+    Training,
+    /// Of a view's rays, one for every [`crate::field::viewing::Rounds`].
+    View,
+}
+
+/// The kept samples and the colour network's activations.
+pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+    let rows = kept_capacity(&plan.config.batch) + SPARE_ROWS;
+    let mut demands = vec![
+        plan.tensor("chosen", Element::Vec4, plan.config.batch.samples),
+        plan.tensor("kept_rows", Element::Pair, rows),
+        plan.tensor("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
+        plan.tensor("color", Element::Vec4, rows),
+    ];
+    demands.extend(plan.color_hidden(&COLOR_HIDDEN, rows));
+    demands
+}
+
+/// Selects, packs and colours.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
+    let (select, packing) = match selection {
+        Selection::Training => (plan.ray_stage(gpu, workspace, &Link::of("select"))?, "training"),
+        Selection::View => (viewing::select(gpu, plan, workspace)?, "view"),
+    };
+    let kept = plan.ray_stage(gpu, workspace, &Link::of("kept").with("packing", packing))?;
+    let input = plan.kernel(gpu, &Link::of("color input"))?;
+    let input = Stage::indirect(workspace.bind(gpu, &input, &[])?, workspace.get("dispatch"), dispatch::KEPT);
+    let mut stages = vec![select, scan(gpu, plan, workspace, Scanned::Kept)?, kept, input];
+    stages.extend(network(gpu, plan, workspace)?);
+    Ok(stages)
+}
+
+/// The colour network's layers.
+fn network(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    let layers = &plan.layout.color;
+    let last = layers.len() - 1;
+    let mut source = "color_input";
+    let mut stages = Vec::new();
+    for (number, layer) in layers.iter().enumerate() {
+        let label = format!("color {number}");
+        let size = Size::Indirect(workspace.get("dispatch").clone(), dispatch::KEPT_TILES);
+        let (store, output) =
+            if number == last { ("color", "color") } else { ("hidden", COLOR_HIDDEN[number]) };
+        let kernel = forward(gpu, plan, &label, layer, ["kept", store])?;
+        let renamed = [("layer_input", source), ("layer_output", output)];
+        stages.push(layer_stage(gpu, workspace, &kernel, layer, &renamed, size)?);
+        source = output;
+    }
+    Ok(stages)
+}

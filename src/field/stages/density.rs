@@ -1,0 +1,115 @@
+//! The density network over all marched samples: encoding and two layers.
+
+use crate::field::march::SPARE_ROWS;
+use crate::field::parameters::{DENSITY_OUTPUTS, Layer, Level};
+use crate::field::{Link, Plan, Workspace, dispatch};
+use crate::gpu::Gpu;
+use crate::gpu::buffer::Buffer;
+use crate::gpu::demand::Demand;
+use crate::gpu::kernel::{Kernel, Resource};
+use crate::gpu::pass::{Size, Stage};
+use crate::gpu::tensor::Element;
+use anyhow::Result;
+
+/// The activations of the marched samples.
+pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+    let rows = plan.config.batch.samples + SPARE_ROWS;
+    vec![
+        plan.tensor("encoding", Element::Vec4, rows * plan.layout.encoding() / 4),
+        plan.tensor("density_hidden", Element::Vec4, rows * plan.config.network.width / 4),
+        plan.tensor("density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
+    ]
+}
+
+/// The parameters: table, weights, occupancy and the levels' description.
+pub(crate) fn parameter_demands(plan: &Plan) -> Vec<Demand> {
+    vec![
+        Demand::uniform_storage::<Level>("levels", plan.layout.levels.len()),
+        Demand::uniform_storage::<[f32; 4]>("mlp", plan.layout.quads),
+        Demand::storage::<f32>("occupancy", plan.cell_count()),
+        plan.tensor("table", Element::Vec2, plan.layout.entries),
+        plan.tensor("occupancy_bits", Element::Word, plan.cell_count() / 32),
+    ]
+}
+
+/// Allocates the parameters and describes the levels.
+///
+/// # Errors
+/// When the adapter cannot hold them.
+pub fn allocate_parameters(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
+    workspace.allocate(gpu, &parameter_demands(plan))?;
+    workspace.write(gpu, "levels", &plan.layout.levels);
+    Ok(())
+}
+
+/// Encodes the samples and runs the density network on them.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    let encode = plan.kernel(gpu, &Link::of("encode"))?;
+    let sizes = workspace.get("dispatch");
+    let hidden = forward(gpu, plan, "density hidden", &plan.layout.density[0], ["samples", "hidden"])?;
+    let out = forward(gpu, plan, "density out", &plan.layout.density[1], ["samples", "linear"])?;
+    let tiles = Size::Indirect(sizes.clone(), dispatch::SAMPLE_TILES);
+    Ok(vec![
+        Stage::indirect(workspace.bind(gpu, &encode, &[])?, sizes, dispatch::ENCODE),
+        layer_stage(
+            gpu,
+            workspace,
+            &hidden,
+            &plan.layout.density[0],
+            &[("layer_input", "encoding"), ("layer_output", "density_hidden")],
+            tiles.clone(),
+        )?,
+        layer_stage(
+            gpu,
+            workspace,
+            &out,
+            &plan.layout.density[1],
+            &[("layer_input", "density_hidden"), ("layer_output", "density_out")],
+            tiles,
+        )?,
+    ])
+}
+
+/// The kernel of a forward layer: which rows it runs over, and where its outputs go.
+///
+/// # Errors
+/// When it cannot be built.
+pub fn forward(
+    gpu: &Gpu,
+    plan: &Plan,
+    label: &str,
+    layer: &Layer,
+    [rows, store]: [&str; 2],
+) -> Result<Kernel> {
+    let link = Link::of_text(label, plan.product.forward(layer.inputs, layer.outputs));
+    plan.kernel(gpu, &link.with("layer_count", rows).with("layer_store", store).counts(&quads(layer)))
+}
+
+/// The constants of a layer's shape.
+#[must_use]
+pub fn quads(layer: &Layer) -> [(&'static str, usize); 2] {
+    [("INPUT_QUADS", layer.inputs / 4), ("OUTPUT_QUADS", layer.outputs / 4)]
+}
+
+/// A layer's kernel bound to its weights and to the `renamed` buffers.
+///
+/// # Errors
+/// When a buffer is missing.
+pub fn layer_stage(
+    gpu: &Gpu,
+    workspace: &Workspace,
+    kernel: &Kernel,
+    layer: &Layer,
+    renamed: &[(&str, &str)],
+    size: Size,
+) -> Result<Stage> {
+    let weights = weights(workspace.get("mlp"), layer);
+    Ok(Stage { bound: workspace.bind_with(gpu, kernel, renamed, &[weights])?, size })
+}
+
+fn weights<'a>(mlp: &'a Buffer, layer: &Layer) -> Resource<'a> {
+    mlp.range("layer_weights", (layer.first_quad * 16) as u64, (layer.quads() * 16) as u64)
+}

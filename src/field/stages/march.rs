@@ -1,0 +1,113 @@
+//! From rays to samples: marching through the occupancy grid, and the scan that packs the samples.
+
+use crate::config::Batch;
+use crate::field::{Counters, Link, Plan, Step, Workspace, dispatch};
+use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
+use crate::gpu::pass::Stage;
+use crate::gpu::tensor::Element;
+use anyhow::Result;
+
+/// Room behind the last sample for the rows that the last thread of a matrix product computes in vain.
+pub const SPARE_ROWS: usize = 1024;
+
+/// Rays, their spans and the samples.
+pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+    let batch = &plan.config.batch;
+    vec![
+        Demand::uniform::<Step>("step"),
+        Demand::uniform_storage::<Counters>("counters", 1),
+        Demand::indirect("dispatch", dispatch::COUNT * 4),
+        Demand::storage::<u32>("ray_steps", batch.rays * plan.step_words()),
+        Demand::storage::<[u32; 2]>("ray_spans", batch.rays),
+        Demand::storage::<[u32; 2]>("kept_spans", batch.rays),
+        plan.tensor("ray_lines", Element::Vec4, 2 * batch.rays),
+        plan.tensor("samples", Element::Vec4, batch.samples + SPARE_ROWS),
+    ]
+}
+
+/// How far rays are marched at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// To the end of the box.
+    Whole,
+    /// From where the round before ended, up to as many samples as the round allows: a
+    /// [`crate::field::viewing`] ray knows its first step in this round and in the next, [`crate::field::Progress::quota`] the most samples of a ray.
+    Round,
+}
+
+impl Extent {
+    fn variant(self) -> &'static str {
+        match self {
+            Self::Whole => "whole",
+            Self::Round => "round",
+        }
+    }
+}
+
+/// Marches the rays to their ends and writes their samples; `jitter` shifts each ray's samples at random.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, jitter: bool) -> Result<Vec<Stage>> {
+    stages_over(gpu, plan, workspace, jitter, Extent::Whole)
+}
+
+/// As [`stages`], over an extent of the rays.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn stages_over(
+    gpu: &Gpu,
+    plan: &Plan,
+    workspace: &Workspace,
+    jitter: bool,
+    extent: Extent,
+) -> Result<Vec<Stage>> {
+    let jitter = if jitter { "on" } else { "off" };
+    let kernel = |label: &str| {
+        plan.kernel(gpu, &Link::of(label).with("jitter", jitter).with("extent", extent.variant()))
+    };
+    let (march, samples) = (kernel("march")?, kernel("samples")?);
+    let sizes = workspace.get("dispatch");
+    Ok(vec![
+        Stage::indirect(workspace.bind(gpu, &march, &[])?, sizes, dispatch::RAYS),
+        scan(gpu, plan, workspace, Scanned::Samples)?,
+        Stage::indirect(workspace.bind(gpu, &samples, &[])?, sizes, dispatch::RAYS),
+    ])
+}
+
+/// What a scan packs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scanned {
+    /// The marched samples.
+    Samples,
+    /// The kept samples.
+    Kept,
+    /// The slots of a view's rays that are free.
+    Free,
+}
+
+/// The scan over the rays' counts.
+///
+/// # Errors
+/// When the kernel cannot be built.
+pub fn scan(gpu: &Gpu, plan: &Plan, workspace: &Workspace, scanned: Scanned) -> Result<Stage> {
+    let batch = &plan.config.batch;
+    let (variant, capacity, spans) = match scanned {
+        Scanned::Samples => ("samples", batch.samples, "ray_spans"),
+        Scanned::Kept => ("kept", kept_capacity(batch), "kept_spans"),
+        Scanned::Free => ("free", batch.rays, "view_slots"),
+    };
+    let link = Link::of_file(&format!("scan {variant}"), "scan");
+    let link = link.with("scanned", variant).with("counted", "written").count("CAPACITY", capacity);
+    let kernel = plan.kernel(gpu, &link)?;
+    Ok(Stage::fixed(workspace.bind(gpu, &kernel, &[("ray_spans", spans)])?, 1, 1))
+}
+
+/// Most kept samples of a step: half as much again as the target, since the number of rays follows it only
+/// from step to step.
+#[must_use]
+pub fn kept_capacity(batch: &Batch) -> usize {
+    (batch.kept / 2 * 3).min(batch.samples)
+}

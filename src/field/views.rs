@@ -1,0 +1,118 @@
+//! The training views on their way to the device: cameras, photos, and what their silhouettes tell.
+
+use crate::camera::Bounds;
+use crate::camera::Camera;
+use crate::capture::dataset::nothing_counts;
+use crate::field::records::{self, Record, Units};
+use crate::field::silhouette::Silhouette;
+use crate::field::{self, Plan};
+use crate::gpu::Gpu;
+use crate::gpu::banks::{Banks, Capacity, rows_of};
+use crate::photo::Photo;
+use anyhow::{Context, Result, ensure};
+use std::sync::Arc;
+
+/// Views whose photos are added one by one, so that not all of them need to be decoded at a time.
+#[derive(Debug)]
+pub struct Views {
+    pub(crate) cameras: Vec<Camera>,
+    pub(crate) bounds: Bounds,
+    /// One per photo that was added.
+    pub(crate) silhouettes: Vec<Silhouette>,
+    /// In box space; one per photo of which a pixel can be drawn.
+    pub(crate) on_device: Vec<field::Camera>,
+    pub(crate) banks: Banks,
+    gpu: Arc<Gpu>,
+    record: Record,
+    units: Units,
+    /// The first row that is free.
+    row: usize,
+}
+
+impl Views {
+    /// Room for the photos of `cameras`, which are in world space.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold them.
+    pub fn new(gpu: &Arc<Gpu>, plan: &Plan, cameras: &[Camera], bounds: &Bounds) -> Result<Self> {
+        Self::within(gpu, plan, cameras, bounds, Capacity::of(&gpu.device.limits(), plan.memory))
+    }
+
+    /// As [`Views::new`], divided as `capacity` says.
+    ///
+    /// # Errors
+    /// As [`Views::new`].
+    pub fn within(
+        gpu: &Arc<Gpu>,
+        plan: &Plan,
+        cameras: &[Camera],
+        bounds: &Bounds,
+        capacity: Capacity,
+    ) -> Result<Self> {
+        let record = plan.record();
+        let pixels = |camera: &Camera| camera.width as usize * camera.height as usize;
+        let rows = cameras.iter().map(|camera| record.rows(pixels(camera))).sum();
+        ensure!(
+            u32::try_from(rows).is_ok() && cameras.iter().all(|camera| is_addressable(camera, record)),
+            "the photos are too large to be addressed; use --downscale 2 or --max-images {}",
+            cameras.len() / 2
+        );
+        let banks = Banks::new(gpu, records::NAME, rows, capacity)
+            .context("use --downscale 2, --crop or --max-images N to train on fewer pixels")?;
+        Ok(Self {
+            cameras: cameras.to_vec(),
+            bounds: bounds.clone(),
+            silhouettes: Vec::with_capacity(cameras.len()),
+            on_device: Vec::with_capacity(cameras.len()),
+            banks,
+            gpu: Arc::clone(gpu),
+            record,
+            units: Units { color: 1.0 / plan.needs.grey, depth: (0.5 / bounds.half) as f32 },
+            row: 0,
+        })
+    }
+
+    /// Adds the photo of the next camera.
+    ///
+    /// # Errors
+    /// When it is not of the camera's size or of the plan's kind, there is no camera left, or the device was lost.
+    pub fn add(&mut self, photo: &Photo) -> Result<()> {
+        let number = self.silhouettes.len();
+        let camera = self.cameras.get(number);
+        let camera =
+            camera.with_context(|| format!("there are only {number} cameras, and one more photo"))?;
+        ensure!(
+            (photo.image.width, photo.image.height) == (camera.width, camera.height),
+            "photo {number} has {}x{} pixels, and its camera {}x{}; start again",
+            photo.image.width,
+            photo.image.height,
+            camera.width,
+            camera.height
+        );
+        let records = self.record.of(photo, self.units)?;
+        self.banks.write(&self.gpu, self.row, &records)?;
+        let pixel_count = (records.len() / self.record.words()) as u32;
+        if pixel_count > 0 {
+            let first_row = self.row as u32;
+            let camera = field::Camera::in_box(camera, &self.bounds);
+            self.on_device.push(field::Camera { first_row, pixel_count, ..camera });
+        }
+        self.row += rows_of(records.len());
+        self.silhouettes.push(Silhouette::of(photo));
+        Ok(())
+    }
+
+    /// Whether every camera has its photo, and some pixel can be drawn.
+    pub(crate) fn check(&self) -> Result<()> {
+        let (photos, cameras) = (self.silhouettes.len(), self.cameras.len());
+        ensure!(photos == cameras, "{photos} photos were added for {cameras} cameras");
+        ensure!(!self.on_device.is_empty(), "{}", nothing_counts(photos));
+        Ok(())
+    }
+}
+
+/// Whether a kernel can count the words of one photo.
+fn is_addressable(camera: &Camera, record: Record) -> bool {
+    let words = u64::from(camera.width) * u64::from(camera.height) * record.words() as u64;
+    u32::try_from(words).is_ok()
+}

@@ -1,0 +1,47 @@
+//! Photos as plain values: pixels, masks, depth, and how they are to be read. No files.
+
+mod alpha;
+pub mod color;
+mod grid;
+mod image;
+mod reading;
+mod reduce;
+mod split;
+
+pub(crate) use alpha::{Evidence, Multiplied};
+pub use grid::{Turn, Window};
+pub(crate) use grid::{crop, nearest};
+pub use image::{BitDepth, Image, Pixels};
+pub use reading::{AlphaMode, Crop, Reading};
+pub(crate) use reduce::{reduce_any, reduce_depth};
+pub use split::Split;
+
+/// One frame's pixels, at the size of its camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Photo {
+    /// The picture.
+    pub image: Image,
+    /// `true` where a mask says that the pixel tells nothing, `[height * width]`; empty where every pixel counts.
+    pub ignored: Vec<bool>,
+    /// Depth in world units as the lens defines it (along the view axis for pinholes), `[height * width]`, 0
+    /// where it is unknown; empty where the frame has none or it was not asked for.
+    pub depth: Vec<f32>,
+}
+
+impl Photo {
+    /// Number of pixels that tell nothing.
+    pub fn count_ignored(&self) -> usize {
+        self.ignored.iter().filter(|&&ignored| ignored).count()
+    }
+
+    /// Whether masks ignore every pixel: there is nothing to train on or to measure.
+    pub fn is_ignored(&self) -> bool {
+        !self.ignored.is_empty() && self.ignored.iter().all(|&ignored| ignored)
+    }
+}
+
+impl From<Image> for Photo {
+    fn from(image: Image) -> Self {
+        Self { image, ignored: Vec::new(), depth: Vec::new() }
+    }
+}

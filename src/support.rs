@@ -1,0 +1,6 @@
+//! What knows nothing of radiance fields: charts, image metrics, files, numbers in words.
+
+pub mod chart;
+pub mod file;
+pub mod format;
+pub mod metrics;

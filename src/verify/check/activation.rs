@@ -1,0 +1,54 @@
+//! What turns raw network outputs into log-density and colour, and its slope.
+
+use super::probe::Probe;
+use super::{Subject, Tally};
+use crate::verify::reference::ColorRange;
+use crate::verify::reference::activation::{
+    MAX_LOG_COLOR, MAX_LOG_DENSITY, color, color_backward, log_density, log_density_backward,
+};
+use anyhow::Result;
+
+/// Values and slopes of the activations of colour and density, also where they are clamped.
+///
+/// # Errors
+/// When the device was lost or refuses the kernel.
+pub fn activations(subject: &Subject) -> Result<Tally> {
+    let mut tally = Tally::new("activations", 5e-7, "eight roundings: e^x, sum, quotient, product");
+    compare(subject, &mut tally, ColorRange::Ldr, "sigmoid")?;
+    compare(subject, &mut tally, ColorRange::Hdr, "exponential")?;
+    Ok(tally)
+}
+
+fn compare(subject: &Subject, tally: &mut Tally, range: ColorRange, activation: &str) -> Result<()> {
+    let body = "let raw = input(0u).x;\n\
+                let gradient = input(0u).y;\n\
+                let color = color_activation(vec3(raw)).x;\n\
+                let d_color = color_activation_backward(vec3(color), vec3(gradient)).x;\n\
+                output(0u, vec4(color, d_color, density_log(raw), density_log_backward(raw, gradient)));";
+    let inputs = inputs();
+    let outputs = Probe { needs: "activation, density", variants: &[("activation", activation)], body }
+        .evaluate::<1, 1>(subject, &inputs)?;
+    for ([[raw, gradient, ..]], [got]) in inputs.into_iter().zip(outputs) {
+        let (raw, gradient, got) = (f64::from(raw), f64::from(gradient), got.map(f64::from));
+        let case = |what: &str| format!("{range:?}: {what} at {raw:e}");
+        let want = color(range, raw);
+        tally.value(got[0], want, want.max(1e-30), || case("colour"));
+        let slope = color_backward(range, raw, gradient);
+        tally.value(got[1], slope, gradient.abs() * want.max(1e-30), || case("slope of colour"));
+        let log = log_density(raw);
+        tally.value(got[2], log, log.abs(), || case("log-density"));
+        let slope = log_density_backward(raw, gradient);
+        tally.value(got[3], slope, gradient.abs(), || case("slope of log-density"));
+    }
+    Ok(())
+}
+
+/// Raw outputs and gradients. Right at the clamp of the colours rounding may decide.
+fn inputs() -> Vec<[[f32; 4]; 1]> {
+    let special = [0.0, 1e-30, -1e-30, 1e30, -1e30, 3e38, -3e38, 87.5, -87.5, -86.9, 200.0, -200.0];
+    let clamps = [MAX_LOG_DENSITY, MAX_LOG_DENSITY + 1e-4, MAX_LOG_COLOR + 1e-4, MAX_LOG_COLOR - 1e-4];
+    let even = (0..4000).map(|i| -86.0 + f64::from(i) / 4000.0 * 172.0);
+    let near = (0..4000).map(|i| -6.0 + f64::from(i) / 4000.0 * 12.0);
+    let raw = special.into_iter().chain(clamps).chain(even).chain(near);
+    raw.flat_map(|raw| [0.75, -1.5].map(|gradient| [[raw as f32, gradient, 0.0, 0.0]])).collect()
+}

@@ -1,0 +1,169 @@
+//! Writes a generated dataset: the images of each split, then its `transforms_*.json`.
+
+use super::picture::{Picture, render};
+use super::rig::{ORBIT_FOV_RAD, Split, camera};
+use super::{Generate, Scene, Summary};
+use crate::camera::{Camera, Lens, LensKind};
+use crate::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use crate::support::file::write_atomically;
+use anyhow::{Context, Result, bail};
+use rayon::prelude::*;
+use serde_json::{Map, Value, json};
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// See [`super::generate`].
+pub(super) fn write(
+    scene: &Scene,
+    options: &Generate,
+    out: &Path,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<Summary> {
+    claim(out)?;
+    let views: Vec<View> = Split::ALL
+        .into_iter()
+        .flat_map(|split| (0..split.views(options)).map(move |index| (split, index)))
+        .map(|(split, index)| View { split, index, camera: camera(scene, options, split, index) })
+        .collect();
+    for split in Split::ALL {
+        let folder = out.join(split.name());
+        fs::create_dir_all(&folder).with_context(|| format!("creating {}", folder.display()))?;
+    }
+    let done = AtomicUsize::new(0);
+    views.par_iter().try_for_each(|view| {
+        let picture = render(scene, &view.camera, options.samples);
+        view.write(&picture, options.hdr, out)?;
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+        anyhow::Ok(())
+    })?;
+    for split in Split::ALL {
+        let frames = views.iter().filter(|view| view.split == split);
+        let listing = listing(scene, options, frames);
+        write_json(&out.join(format!("transforms_{}.json", split.name())), &listing)?;
+    }
+    let files = 2 * views.len() + Split::ALL.len();
+    Ok(Summary { scene: scene.info().name, views: views.len(), files })
+}
+
+/// Creates the folder `out`, or accepts it where it is empty.
+fn claim(out: &Path) -> Result<()> {
+    let show = out.display();
+    if out.exists() {
+        let mut entries = fs::read_dir(out).with_context(|| format!("{show} cannot be used as a folder"))?;
+        if entries.next().is_some() {
+            bail!("{show} is not empty; name a new or empty folder, or remove it first");
+        }
+    }
+    fs::create_dir_all(out).with_context(|| format!("creating {show}"))
+}
+
+/// One picture of the dataset.
+struct View {
+    split: Split,
+    index: usize,
+    camera: Camera,
+}
+
+impl View {
+    /// The path of its files within the dataset, without extension.
+    fn stem(&self) -> String {
+        format!("{}/{:04}", self.split.name(), self.index)
+    }
+
+    fn depth_path(&self) -> String {
+        format!("{}_depth.exr", self.stem())
+    }
+
+    fn write(&self, picture: &Picture, hdr: bool, out: &Path) -> Result<()> {
+        let (width, height) = (self.camera.width, self.camera.height);
+        let color = &picture.linear[..];
+        let depth = ExrPixels { color, depth: Some(&picture.depth) };
+        write_exr(&out.join(self.depth_path()), width, height, &depth, Precision::Float)?;
+        if hdr {
+            let path = out.join(format!("{}.exr", self.stem()));
+            let image = ExrPixels { color, depth: None };
+            write_exr(&path, width, height, &image, Precision::Float)
+        } else {
+            write_png_rgba8(&out.join(format!("{}.png", self.stem())), width, height, &picture.srgb)
+        }
+    }
+
+    /// Its entry in `transforms_*.json`; `extension` is that of the image, with its dot.
+    fn entry(&self, extension: &str) -> Map<String, Value> {
+        let pose = self.camera.world_from_camera;
+        let rows = [0, 1, 2].map(|row| {
+            let axes = pose.matrix3.row(row);
+            [axes.x, axes.y, axes.z, pose.translation[row]]
+        });
+        Map::from_iter([
+            ("file_path".to_owned(), json!(format!("./{}{extension}", self.stem()))),
+            ("depth_file_path".to_owned(), json!(format!("./{}", self.depth_path()))),
+            ("transform_matrix".to_owned(), json!([rows[0], rows[1], rows[2], [0.0, 0.0, 0.0, 1.0]])),
+        ])
+    }
+}
+
+/// The contents of a `transforms_*.json`: in Blender's dialect (`camera_angle_x`, 8-bit images named without
+/// extension) for scenes with alpha seen by pinholes, else with full intrinsics, of every frame where they differ.
+fn listing<'a>(scene: &Scene, options: &Generate, views: impl Iterator<Item = &'a View>) -> Value {
+    let is_blender = !scene.is_opaque() && options.lenses.iter().all(|&kind| kind == LensKind::Pinhole);
+    let extension = match (options.hdr, is_blender) {
+        (true, _) => ".exr",
+        (false, false) => ".png",
+        (false, true) => "",
+    };
+    let is_mixed = options.lenses.len() > 1;
+    let mut listing = Map::new();
+    let mut frames = Vec::new();
+    for view in views {
+        let mut entry = view.entry(extension);
+        if is_mixed {
+            entry.extend(intrinsics(&view.camera));
+        } else if listing.is_empty() && !is_blender {
+            listing.extend(intrinsics(&view.camera));
+        }
+        frames.push(Value::Object(entry));
+    }
+    if is_blender || frames.is_empty() {
+        let (width, height) = options.size;
+        listing.insert("camera_angle_x".to_owned(), json!(ORBIT_FOV_RAD));
+        listing.insert("w".to_owned(), json!(width));
+        listing.insert("h".to_owned(), json!(height));
+    }
+    listing.insert("frames".to_owned(), Value::Array(frames));
+    Value::Object(listing)
+}
+
+/// A camera's size, focal lengths, principal point and lens, in pixels, as capture tools name them.
+fn intrinsics(camera: &Camera) -> Map<String, Value> {
+    let mut keys = Map::new();
+    let mut put = |name: &str, value: Value| keys.insert(name.to_owned(), value);
+    let (model, coefficients) = match camera.lens {
+        Lens::Pinhole => ("PINHOLE", Vec::new()),
+        Lens::OpenCv { k, p } => ("OPENCV", [&k[..], &p[..]].concat()),
+        Lens::Fisheye { k } => ("OPENCV_FISHEYE", k.to_vec()),
+        Lens::Orthographic => ("ORTHOGRAPHIC", Vec::new()),
+        Lens::Equirectangular => ("EQUIRECTANGULAR", Vec::new()),
+    };
+    put("camera_model", json!(model));
+    put("w", json!(camera.width));
+    put("h", json!(camera.height));
+    put("fl_x", json!(camera.focal_px.x));
+    put("fl_y", json!(camera.focal_px.y));
+    put("cx", json!(camera.center_px.x));
+    put("cy", json!(camera.center_px.y));
+    for (name, value) in ["k1", "k2", "k3", "k4", "p1", "p2"].into_iter().zip(coefficients) {
+        put(name, json!(value));
+    }
+    keys
+}
+
+fn write_json(path: &Path, value: &Value) -> Result<()> {
+    write_atomically(path, |file| {
+        serde_json::to_writer_pretty(&mut *file, value)?;
+        file.write_all(b"\n")?;
+        Ok(())
+    })
+}
