@@ -1,14 +1,14 @@
 // Adam on the hash table, two entries per thread. A parameter whose gradient is exactly zero was not touched by this
 // batch: it and its moments stay.
-// needs: adam, gradient_take
+// needs: adam, gradient_take, group
 
 tensor<read_write> table: vec2<f32>;
 // First moments of both features, then the second moments.
 tensor<read_write> table_moments: vec4<f32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let index = 2u * (id.x + id.y * GROUP_COLUMNS * 64u);
+    let index = 2u * wide_index(id);
     if index >= TABLE_ENTRIES {
         return;
     }

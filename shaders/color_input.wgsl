@@ -1,12 +1,12 @@
 // The colour network's input: the density network's outputs and the harmonics of the ray's direction.
-// needs: counters, harmonics, ray_load
+// needs: counters, group, harmonics, ray_load
 
 tensor<read> density_out: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
 // `[kept, 8]`: 16 features, 16 harmonics.
 tensor<write> color_input: vec4<f32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.kept {

@@ -5,7 +5,7 @@
 // squared error is their product: (R' - g)(R'' - g), whose mean is the square of the mean error. The square of a single
 // estimate would hold its variance too, and gradients would make rays opaque too early, where nothing is left out. A
 // whole ray has one colour, and both are that.
-// needs: counters, depth_loss, distortion, exp, kept_load, loss, ray_result, ray_target, sparsity, sum, transmittance, weights
+// needs: counters, depth_loss, distortion, exp, group, kept_load, loss, ray_result, ray_target, sparsity, sum, transmittance, weights
 
 var<storage, read> kept_spans: array<vec2<u32>>;
 // Optical depth behind the last kept sample.
@@ -17,7 +17,7 @@ var<storage, read_write> ray_results: array<RayResult>;
 // sample, and what the distortion sums up in front of it.
 tensor<read_write> d_color: vec4<f32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays_used {

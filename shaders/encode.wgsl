@@ -1,6 +1,6 @@
 // Hash-grid features of each sample, two levels per thread: one pair of levels per row of workgroups, so that their
 // entries stay in the cache.
-// needs: counters, grid
+// needs: counters, grid, group
 
 tensor<read> samples: vec4<f32>;
 tensor<read> table: vec2<f32>;
@@ -20,7 +20,7 @@ fn encode_level(position: vec3<f32>, level: Level) -> vec2<f32> {
     return feature;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.samples {

@@ -1,16 +1,15 @@
 // Ends a step: sums the errors of its rays and chooses the number of rays of the next one, so that the kept samples
 // meet their target and the marched ones fit. One workgroup.
-// needs: counters, ray_result, usable
+// needs: counters, dispatch, group, ray_result, usable
 
-var<storage, read_write> dispatch: array<vec3<u32>>;
 var<storage, read> ray_results: array<RayResult>;
-var<workgroup> sums: array<vec4<f32>, 64>;
+var<workgroup> sums: array<vec4<f32>, GROUP_SIZE>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(local_invocation_index) thread: u32) {
     let rays = counters.rays_used;
     var sum = vec4(0.0);
-    for (var i = thread; i < rays; i += 64u) {
+    for (var i = thread; i < rays; i += GROUP_SIZE) {
         sum += ray_results[i].errors;
     }
     sums[thread] = sum;
@@ -19,7 +18,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
         return;
     }
     var total = vec4(0.0);
-    for (var i = 0u; i < 64u; i++) {
+    for (var i = 0u; i < GROUP_SIZE; i++) {
         total += sums[i];
     }
     let used = f32(max(rays, 1u));
@@ -46,5 +45,5 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     let factor = clamp(min(fit_kept, fit_samples), 0.5, 1.5);
     let next = clamp(u32(asked * factor), LEAST_RAYS, MOST_RAYS);
     counters.rays = next;
-    dispatch[DISPATCH_RAYS] = workgroups(next, 64u);
+    dispatch[DISPATCH_RAYS] = workgroups(next, 1u);
 }

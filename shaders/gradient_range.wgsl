@@ -1,5 +1,5 @@
 // The largest gradient of the encoding and the largest squared error, before any gradient is used.
-// needs: counters, magnitude, ray_result
+// needs: counters, group, magnitude, ray_result
 
 // Two levels in each.
 tensor<read> d_encoding: vec4<f32>;
@@ -8,7 +8,7 @@ var<storage, read_write> gradient_range: array<atomic<u32>>;
 var<workgroup> most_gradient: atomic<u32>;
 var<workgroup> most_error: atomic<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(
     @builtin(global_invocation_id) id: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
@@ -26,7 +26,7 @@ fn main(
         atomicMax(&most_gradient, own);
     }
     // As many threads as the dispatch over kept samples has; D3D12 does not tell the number of its workgroups.
-    let threads = workgroups(counters.kept, 64u).x * 64u;
+    let threads = workgroups(counters.kept, 1u).x * GROUP_SIZE;
     for (var ray = id.x; ray < counters.rays_used; ray += threads) {
         atomicMax(&most_error, magnitude_bits(ray_results[ray].errors));
     }

@@ -1,5 +1,5 @@
 // Writes the chosen samples of all rays one behind the other.
-// needs: counters, packing
+// needs: counters, group, packing
 
 var<storage, read> ray_spans: array<vec2<u32>>;
 var<storage, read> kept_spans: array<vec2<u32>>;
@@ -7,7 +7,7 @@ tensor<read> chosen: vec4<f32>;
 // Sample and ray.
 tensor<write> kept_rows: vec2<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays_used {

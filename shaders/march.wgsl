@@ -1,5 +1,5 @@
 // Marks the steps of each ray that lie in occupied cells: one bit per step, and their number.
-// needs: counters, extent, march_start, occupancy, ray_load, stepping
+// needs: counters, extent, group, march_start, occupancy, ray_load, stepping
 
 tensor<read> occupancy_bits: u32;
 var<storage, read_write> ray_steps: array<u32>;
@@ -20,7 +20,7 @@ fn distance_through_cell(position: vec3<f32>, direction: vec3<f32>, cascade: u32
     return min(steps.x, min(steps.y, steps.z)) * cascade_side(cascade) / f32(CELLS);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays {

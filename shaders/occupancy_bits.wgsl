@@ -1,13 +1,14 @@
 // One bit per cell: occupied when its optical depth exceeds the threshold. Then all cells fade: those that neither a ray
 // nor a visit raises again are empty after a while.
+// needs: group
 
 var<storage, read_write> occupancy: array<f32>;
 var<storage, read> occupancy_mean: array<f32>;
 tensor<write> occupancy_bits: u32;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let index = id.x + id.y * GROUP_COLUMNS * 64u;
+    let index = wide_index(id);
     if index >= CELL_COUNT / 32u {
         return;
     }

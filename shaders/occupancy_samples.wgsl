@@ -1,15 +1,16 @@
 // One random position in each visited cell of a chunk, as samples for the density network.
-// needs: counters, occupancy, random, step
+// needs: counters, dispatch, group, occupancy, random, step
 
 // Indices of the cells that can hold something.
 var<storage, read> visible_cells: array<u32>;
 tensor<write> samples: vec4<f32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index == 0u {
         counters.samples = step.cell_count;
+        dispatch_over_samples(step.cell_count);
     }
     if index >= step.cell_count {
         return;

@@ -1,10 +1,10 @@
 // One training ray per thread: a random pixel of a random image, its ray and its target.
-// needs: background, camera, counters, depth_target, lens, pixels, position, random, ray_store, ray_target, step
+// needs: background, camera, counters, depth_target, group, lens, pixels, position, random, ray_store, ray_target, step
 
 var<storage, read> cameras: array<Camera>;
 var<storage, read_write> ray_targets: array<RayTarget>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays {

@@ -1,12 +1,12 @@
 // Writes the marked steps of each ray as samples: position in box space and length of the step.
-// needs: counters, extent, march_start, ray_load, stepping
+// needs: counters, extent, group, march_start, ray_load, stepping
 
 var<storage, read> ray_steps: array<u32>;
 var<storage, read> ray_spans: array<vec2<u32>>;
 // Position, and the step's length in units of the inner cube's side.
 tensor<write> samples: vec4<f32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays_used {

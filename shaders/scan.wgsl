@@ -2,15 +2,16 @@
 // order of the samples does not depend on scheduling). Rays that exceed CAPACITY get no samples. One workgroup.
 // needs: scanned
 
-var<storage, read_write> dispatch: array<vec3<u32>>;
+const THREADS = 256u;
+
 var<storage, read_write> ray_spans: array<vec2<u32>>;
-var<workgroup> sums: array<u32, 256>;
+var<workgroup> sums: array<u32, THREADS>;
 var<workgroup> first_dropped: atomic<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(THREADS)
 fn main(@builtin(local_invocation_index) thread: u32) {
     let rays = scan_rays();
-    let share = (rays + 255u) / 256u;
+    let share = (rays + THREADS - 1u) / THREADS;
     let begin = min(thread * share, rays);
     let end = min(begin + share, rays);
     var sum = 0u;
@@ -22,7 +23,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
         atomicStore(&first_dropped, rays);
     }
     workgroupBarrier();
-    for (var reach = 1u; reach < 256u; reach *= 2u) {
+    for (var reach = 1u; reach < THREADS; reach *= 2u) {
         var below = 0u;
         if thread >= reach {
             below = sums[thread - reach];
@@ -52,6 +53,6 @@ fn main(@builtin(local_invocation_index) thread: u32) {
             let last = ray_spans[used - 1u];
             total = last.x + last.y;
         }
-        scan_finish(used, total, sums[255]);
+        scan_finish(used, total, sums[THREADS - 1u]);
     }
 }

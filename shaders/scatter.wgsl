@@ -1,12 +1,12 @@
 // The encoding's backward pass: adds each kept sample's gradient to the eight corners of its cells.
-// needs: corners, counters, usable
+// needs: corners, counters, group, usable
 
 tensor<read> samples: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
 // Two levels in each.
 tensor<read> d_encoding: vec4<f32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.kept || !gradients_usable() {

@@ -5,7 +5,7 @@
 // group that stays lighter than LIGHT_SHARE of the floor is kept by chance; what that adds to the ray's weight or takes
 // from it is made up for by the estimate's next kept sample. Opacity and transmittance are those of all samples.
 // Nothing is kept behind the point where the ray is opaque; see `reference::selection`.
-// needs: counters, density, exp, occupancy, occupancy_raise, random, step
+// needs: counters, density, exp, group, occupancy, occupancy_raise, random, step
 
 tensor<read> samples: vec4<f32>;
 tensor<read> density_out: vec4<f32>;
@@ -91,7 +91,7 @@ fn join(walk: Walk, member: Member) -> Walk {
     return after;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays_used {

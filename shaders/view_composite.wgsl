@@ -1,5 +1,5 @@
 // Adds the colours of a round to a view's rays, and writes the pixels of those that ended.
-// needs: counters, progress, view_ray
+// needs: counters, group, progress, view_ray
 
 var<uniform> progress: Progress;
 var<storage, read> ray_spans: array<vec2<u32>>;
@@ -14,7 +14,7 @@ tensor<read_write> ray_states: vec4<f32>;
 // it, in box units, 0 where the opacity is below 1e-3.
 var<storage, read_write> view_pixels: array<f32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays_used {

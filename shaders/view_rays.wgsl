@@ -1,5 +1,5 @@
 // Begins the rays of the next pixels of a view where slots are free.
-// needs: camera, counters, progress, ray_store, view_ray
+// needs: camera, counters, group, progress, ray_store, view_ray
 
 var<uniform> progress: Progress;
 var<uniform> view_camera: Camera;
@@ -10,7 +10,7 @@ var<storage, read_write> view_rays: array<ViewRay>;
 // depths; then the sum of weighted colours.
 tensor<write> ray_states: vec4<f32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays || view_slots[index].y == 0u {

@@ -1,7 +1,7 @@
 // Adds the samples of a round to the optical depth, opacity and depth of a view's rays, and decides which of them get
 // colour: wherever the weights since the last one sum to COLOR_WEIGHT. That sample's colour stands for theirs. A ray
 // ends where it is opaque or leaves the box.
-// needs: camera, counters, density, exp, lens, transmittance, view_ray
+// needs: camera, counters, density, exp, group, lens, transmittance, view_ray
 
 var<uniform> view_camera: Camera;
 tensor<read> samples: vec4<f32>;
@@ -16,7 +16,7 @@ tensor<write> chosen: vec4<f32>;
 // 1 where the slot's ray ended.
 var<storage, read_write> view_slots: array<vec2<u32>>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays_used {

@@ -127,12 +127,12 @@ impl Bench {
         Ok(result)
     }
 
-    /// A stage of `groups` workgroups of these parts.
-    fn stage(&self, label: &str, source: Source, buffers: &[&Buffer], groups: usize) -> Result<Stage> {
+    /// A stage of `threads` threads of these parts.
+    fn stage(&self, label: &str, source: Source, buffers: &[&Buffer], threads: usize) -> Result<Stage> {
         let source = source.count("SINK_MASK", SINK - 1);
         let kernel = Kernel::new(&self.gpu, &source, &[]).with_context(|| label.to_owned())?;
         let resources: Vec<_> = buffers.iter().map(|buffer| buffer.resource()).collect();
-        Ok(Stage::wide(kernel.bind(&self.gpu, &resources)?, groups))
+        Ok(Stage::wide(kernel.bind(&self.gpu, &resources)?, threads))
     }
 
     /// Seconds of one run of `stage`: as many as fit into the time are submitted, at least three; the fastest third's
@@ -162,7 +162,7 @@ impl Bench {
         let rounds = 16 * ROUNDS;
         let (name, text) = part!("multiply_add");
         let source = Source::new(name).count("ROUNDS", rounds).part(name, text);
-        let stage = self.stage(name, source, &[&self.sink], THREADS / 64)?;
+        let stage = self.stage(name, source, &[&self.sink], THREADS)?;
         Ok((THREADS * rounds * FLOPS_OF_ROUND) as f64 / self.time(&stage)?)
     }
 
@@ -174,8 +174,8 @@ impl Bench {
         let buffers =
             [self.gpu.storage::<[f32; 4]>("source", count)?, self.gpu.storage::<[f32; 4]>("copied", count)?];
         let (name, text) = part!("copy");
-        let source = Source::new(name).count("COUNT", count).count("GROUP_COLUMNS", GROUP_COLUMNS);
-        let stage = self.stage(name, source.part(name, text), &buffers.each_ref(), count.div_ceil(64))?;
+        let source = Source::new(name).count("COUNT", count).count("GROUP_COLUMNS", GROUP_COLUMNS as usize);
+        let stage = self.stage(name, source.part(name, text), &buffers.each_ref(), count)?;
         Ok((2 * 16 * count) as f64 / self.time(&stage)?)
     }
 
@@ -203,7 +203,7 @@ impl Bench {
         let source = Source::new(label).count("ROUNDS", ROUNDS).count("INDEX_MASK", entries - 1);
         let parts = [&[part!("random")], parts].concat();
         let source = parts.iter().fold(source, |source, (name, text)| source.part(name, *text));
-        self.stage(label, source, buffers, THREADS / 64)
+        self.stage(label, source, buffers, THREADS)
     }
 
     /// Seconds from the end of one dispatch to the end of the next, which waits for it and does nothing.

@@ -27,7 +27,3 @@ struct Counters {
     sum_loss: f32,
     sum_color_error: f32,
 }
-
-fn workgroups(count: u32, per_group: u32) -> vec3<u32> {
-    return vec3(max((count + per_group - 1u) / per_group, 1u), 1u, 1u);
-}

@@ -1,5 +1,5 @@
 // The kept samples: which rays fit, and the sizes of the dispatches over kept samples.
-// needs: counters
+// needs: counters, dispatch
 
 fn scan_rays() -> u32 {
     return counters.rays_used;
@@ -9,6 +9,5 @@ fn scan_finish(rays_used: u32, kept: u32, wanted: u32) {
     counters.rays_used = rays_used;
     counters.kept = kept;
     counters.kept_wanted = wanted;
-    dispatch[DISPATCH_KEPT] = workgroups(kept, 64u);
-    dispatch[DISPATCH_KEPT_TILES] = workgroups(kept, 64u * SAMPLES_PER_THREAD);
+    dispatch_over_kept(kept);
 }

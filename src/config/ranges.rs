@@ -1,8 +1,10 @@
 //! What each setting may be.
 
 use super::{Accumulation, Config};
-use crate::gpu::pass::MOST_THREADS;
 use anyhow::{Result, bail};
+
+/// Most rays or samples of a step: what every adapter dispatches along one axis, 65,535 workgroups of 64.
+const MOST_COUNT: usize = 65_535 * 64;
 
 impl Config {
     /// Checks every range.
@@ -35,9 +37,9 @@ impl Config {
         whole("march.most_steps", march.most_steps, 32, 1 << 14, 32)?;
         whole("occupancy.cells", occupancy.cells as usize, 16, 256, 16)?;
         whole("occupancy.interval", occupancy.interval as usize, 1, 1 << 20, 1)?;
-        whole("batch.kept", batch.kept, march.most_steps, MOST_THREADS, 1)?;
-        whole("batch.samples", batch.samples, batch.kept.max(march.most_steps), MOST_THREADS, 1)?;
-        whole("batch.rays", batch.rays, 64, MOST_THREADS, 1)?;
+        whole("batch.kept", batch.kept, march.most_steps, MOST_COUNT, 1)?;
+        whole("batch.samples", batch.samples, batch.kept.max(march.most_steps), MOST_COUNT, 1)?;
+        whole("batch.rays", batch.rays, 64, MOST_COUNT, 1)?;
         whole("batch.first_rays", batch.first_rays as usize, 1, batch.rays, 1)?;
         let real = |key: &str, value: f64, low: f64, high: f64| {
             if !(low..=high).contains(&value) {

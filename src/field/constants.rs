@@ -56,7 +56,7 @@ impl Plan {
             ("DENSITY_QUADS", DENSITY_OUTPUTS / 4),
             ("MLP_QUADS", layout.quads),
             ("CHUNKS", self.chunks),
-            ("GROUP_COLUMNS", GROUP_COLUMNS),
+            ("GROUP_COLUMNS", GROUP_COLUMNS as usize),
             ("SAMPLES_PER_THREAD", self.product.rows),
             ("CELLS", config.occupancy.cells as usize),
             ("CELL_COUNT", self.cell_count()),

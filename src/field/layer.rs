@@ -116,13 +116,12 @@ impl Product {
             ("", "")
         };
         format!(
-            "// needs: layer_count, {needs}\n\
+            "// needs: group, layer_count, {needs}\n\
              var<uniform> layer_weights: array<vec4<f32>, {weights}>;\n\
-             @compute @workgroup_size(64)\n\
+             @compute @workgroup_size(GROUP_SIZE)\n\
              fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>{argument}) {{\n    \
                  let first = id.x * {rows}u;\n    \
-                 if group.x * {}u >= layer_count() {{\n        return;\n    }}\n{lane}",
-            64 * rows
+                 if group.x * GROUP_SIZE * {rows}u >= layer_count() {{\n        return;\n    }}\n{lane}"
         )
     }
 }
@@ -142,14 +141,13 @@ impl Product {
         if self.shared_weights { shared_weight_gradient(quads) } else { own_weight_gradient(quads) }
     }
 
-    /// Workgroups of a weight gradient over `chunks` chunks of rows.
+    /// Threads of a weight gradient over `chunks` chunks of rows.
     #[must_use]
-    pub fn weight_gradient_groups(self, inputs: usize, quads: usize, chunks: usize) -> usize {
+    pub fn weight_gradient_threads(self, inputs: usize, quads: usize, chunks: usize) -> usize {
         if self.shared_weights {
-            inputs.div_ceil(SHARED_INPUTS) * chunks
+            inputs.div_ceil(SHARED_INPUTS) * SHARED * chunks
         } else {
-            let tiles = (inputs / TILE_INPUTS) * (quads / quads.min(TILE_OUTPUT_QUADS));
-            (tiles * chunks).div_ceil(8)
+            (inputs / TILE_INPUTS) * (quads / quads.min(TILE_OUTPUT_QUADS)) * chunks
         }
     }
 }

@@ -179,10 +179,9 @@ impl Plan {
         Kernel::new(gpu, &source, shared::LAYOUTS)
     }
 
-    /// A kernel over the rays, bound to what it uses.
-    pub(crate) fn ray_stage(&self, gpu: &Gpu, workspace: &Workspace, link: &Link) -> Result<Stage> {
-        let bound = workspace.bind(gpu, &self.kernel(gpu, link)?, &[])?;
-        Ok(Stage::indirect(bound, workspace.get("dispatch"), dispatch::RAYS))
+    /// A kernel over a count that the device knows, one of [`dispatch`], bound to what it uses.
+    pub(crate) fn stage(&self, gpu: &Gpu, workspace: &Workspace, link: &Link, over: usize) -> Result<Stage> {
+        workspace.stage(workspace.bind(gpu, &self.kernel(gpu, link)?, &[])?, over)
     }
 
     /// Whether colour errors count relative to the colour.

@@ -2,7 +2,7 @@
 
 use crate::camera::Bounds;
 use crate::camera::{Camera, LensKind};
-use crate::field::{self, Counters, Plan, Progress, Workspace, color, density, march, viewing};
+use crate::field::{self, Counters, Plan, Progress, Workspace, color, density, dispatch, march, viewing};
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::demand::Demand;
@@ -178,7 +178,7 @@ impl Renderer {
             "counters",
             &[Counters { rays, step_excess: STEP_EXCESS * self.step_excess, ..Counters::default() }],
         );
-        workspace.write(gpu, "dispatch", &[[rays.div_ceil(64), 1, 1, 0]]);
+        workspace.set_dispatch(gpu, dispatch::RAYS, rays as usize);
         let (begin, end) = (band.start as u32, band.end as u32);
         let progress =
             Progress { next_pixel: begin, band_begin: begin, band_end: end, ..Progress::default() };

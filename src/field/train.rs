@@ -6,7 +6,7 @@
 use crate::field::parameters::{FEATURES, pcg};
 use crate::field::views::Views;
 use crate::field::visibility::hidden_cells;
-use crate::field::{self, Counters, Plan, Step, Workspace, color, density, march, occupancy, training};
+use crate::field::{Counters, Plan, Step, Workspace, color, density, dispatch, march, occupancy, training};
 use crate::gpu::Gpu;
 use crate::gpu::pass::Stage;
 use crate::gpu::timer::Timer;
@@ -154,8 +154,7 @@ impl Trainer {
         let State { rays, step_excess, .. } = *state;
         let counters = Counters { rays, rays_used: 1, step_excess, ..Counters::default() };
         self.gpu.write(self.workspace.get("counters"), 0, &[counters]);
-        let groups = [[state.rays.div_ceil(64), 1, 1, 0]];
-        self.gpu.write(self.workspace.get("dispatch"), field::dispatch::RAYS, &groups);
+        self.workspace.set_dispatch(&self.gpu, dispatch::RAYS, state.rays as usize);
         let mut encoder = self.gpu.encoder("restore");
         self.workspace.tensor("d_table").clear(&mut encoder);
         encoder.clear_buffer(&self.workspace.get("gradient_range").raw, 0, None);

@@ -1,12 +1,14 @@
 //! Buffers and tensors by name.
 
+use super::link::group_size;
 use crate::gpu::Gpu;
 use crate::gpu::banks::Banks;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::demand::{Allocation, Demand};
 use crate::gpu::kernel::{Bound, Kernel, Resource};
+use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Tensor;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 /// Buffers and tensors by name: what kernels are bound to.
 #[derive(Clone, Debug, Default)]
@@ -142,6 +144,27 @@ impl Workspace {
         resources.extend(self.tensors.iter().map(|tensor| tensor.named(tensor.name)));
         resources.extend(self.banks.iter().flat_map(Banks::resources));
         kernel.bind(gpu, &resources)
+    }
+
+    /// A kernel over a count that the device knows, one of [`super::dispatch`].
+    ///
+    /// # Errors
+    /// When its workgroups have another size than those that the device counts: a mistake in its shader.
+    pub fn stage(&self, bound: Bound, over: usize) -> Result<Stage> {
+        ensure!(
+            bound.group_size as usize == group_size(),
+            "the kernel '{}' has workgroups of {} threads, and counts are divided into {}",
+            bound.label,
+            bound.group_size,
+            group_size()
+        );
+        Ok(Stage::indirect(bound, self.get("dispatch"), over))
+    }
+
+    /// Sets the size of the dispatches over a count that the host knows: one of [`super::dispatch`].
+    pub fn set_dispatch(&self, gpu: &Gpu, over: usize, count: usize) {
+        let groups = [[count.div_ceil(group_size()).max(1) as u32, 1, 1, 0]];
+        gpu.write(self.get("dispatch"), over, &groups);
     }
 
     /// Bytes of everything in it.

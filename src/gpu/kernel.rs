@@ -51,6 +51,7 @@ pub struct Kernel {
     pipeline: wgpu::ComputePipeline,
     group: wgpu::BindGroupLayout,
     bindings: Vec<Binding>,
+    group_size: u32,
 }
 
 /// A kernel with its buffers: ready to be dispatched.
@@ -58,6 +59,8 @@ pub struct Kernel {
 pub struct Bound {
     /// The kernel's name.
     pub label: String,
+    /// Threads of a workgroup along x, as its shader says.
+    pub group_size: u32,
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) group: wgpu::BindGroup,
 }
@@ -110,7 +113,7 @@ impl Kernel {
     /// # Errors
     /// When the WGSL does not link, a struct differs from Rust's, or the driver refuses the pipeline.
     pub fn new(gpu: &Gpu, source: &Source, layouts: &[Layout]) -> Result<Self> {
-        let Linked { label, module, bindings } = source.link()?;
+        let Linked { label, module, bindings, group_size } = source.link()?;
         for layout in layouts {
             compare_layout(&label, &module, layout)?;
         }
@@ -142,7 +145,7 @@ impl Kernel {
         if let Some(error) = pollster::block_on(scope.pop()) {
             bail!("creating the kernel '{label}' on '{}': {error}", gpu.info.name);
         }
-        Ok(Self { label, pipeline, group, bindings })
+        Ok(Self { label, pipeline, group, bindings, group_size })
     }
 
     /// Binds the buffers this kernel uses out of `resources`; others are ignored.
@@ -166,7 +169,8 @@ impl Kernel {
             layout: &self.group,
             entries: &entries,
         });
-        Ok(Bound { label: self.label.clone(), pipeline: self.pipeline.clone(), group })
+        let (label, pipeline) = (self.label.clone(), self.pipeline.clone());
+        Ok(Bound { label, group_size: self.group_size, pipeline, group })
     }
 }
 

@@ -23,31 +23,50 @@ pub struct Stage {
     pub size: Size,
 }
 
-/// Workgroups along x of a dispatch that has several along y; kernels know it as GROUP_COLUMNS. Adapters take 65,535 at
-/// least.
-pub const GROUP_COLUMNS: usize = 1 << 15;
+/// Workgroups along x of a dispatch that has several rows of them; kernels know it as GROUP_COLUMNS. Adapters take 65,535
+/// at least.
+pub const GROUP_COLUMNS: u32 = 1 << 15;
 
-/// Threads of a dispatch along x, in workgroups of 64: what every adapter takes.
-pub const MOST_THREADS: usize = 65_535 * 64;
+impl Bound {
+    /// Workgroups whose threads along x are at least `threads`.
+    #[must_use]
+    pub fn groups(&self, threads: usize) -> u32 {
+        threads.div_ceil(self.group_size as usize) as u32
+    }
+}
 
 impl Stage {
-    /// A stage of so many workgroups, which need not fit along one axis.
+    /// A stage of so many threads along one axis, rounded up to whole workgroups.
     #[must_use]
-    pub fn wide(bound: Bound, groups: usize) -> Self {
-        let columns = groups.min(GROUP_COLUMNS);
-        Self::fixed(bound, columns, groups.div_ceil(columns.max(1)))
+    pub fn over(bound: Bound, threads: usize) -> Self {
+        let size = Size::Fixed(bound.groups(threads), 1);
+        Self { bound, size }
     }
 
-    /// A stage of fixed size.
+    /// A stage of so many threads, whose workgroups need not fit along one axis: the kernel counts rows of
+    /// [`GROUP_COLUMNS`].
     #[must_use]
-    pub fn fixed(bound: Bound, x: usize, y: usize) -> Self {
-        Self { bound, size: Size::Fixed(x as u32, y as u32) }
+    pub fn wide(bound: Bound, threads: usize) -> Self {
+        let groups = bound.groups(threads);
+        let columns = groups.min(GROUP_COLUMNS);
+        Self { size: Size::Fixed(columns, groups.div_ceil(columns.max(1))), bound }
+    }
+
+    /// A stage of one workgroup.
+    #[must_use]
+    pub fn single(bound: Bound) -> Self {
+        Self { bound, size: Size::Fixed(1, 1) }
     }
 
     /// A stage whose size lies at `index` of `dispatch`.
     #[must_use]
     pub fn indirect(bound: Bound, dispatch: &Buffer, index: usize) -> Self {
         Self { bound, size: Size::Indirect(dispatch.clone(), index) }
+    }
+
+    /// Makes it one of so many threads along one axis.
+    pub fn resize(&mut self, threads: usize) {
+        self.size = Size::Fixed(self.bound.groups(threads), 1);
     }
 
     fn record(&self, pass: &mut wgpu::ComputePass<'_>) {

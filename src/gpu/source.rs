@@ -26,6 +26,8 @@ pub struct Linked {
     pub module: naga::Module,
     /// The resources the entry point `main` reaches; the index is the binding number.
     pub bindings: Vec<Binding>,
+    /// Threads of a workgroup along x.
+    pub group_size: u32,
 }
 
 /// One buffer or texture of a kernel.
@@ -134,7 +136,8 @@ impl Source {
             let resource = naga::ResourceBinding { group: 0, binding: binding as u32 };
             module.global_variables[handle].binding = Some(resource);
         }
-        Ok(Linked { label: self.label.clone(), module, bindings })
+        let group_size = module.entry_points[0].workgroup_size[0];
+        Ok(Linked { label: self.label.clone(), module, bindings, group_size })
     }
 
     /// Names the part that holds `line` of the linked text, and the line within it.

@@ -6,7 +6,7 @@ use crate::field::parameters::COLOR_INPUTS;
 use crate::field::{Link, Plan, Workspace, dispatch, viewing};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
-use crate::gpu::pass::{Size, Stage};
+use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
 
@@ -41,12 +41,11 @@ pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
     let (select, packing) = match selection {
-        Selection::Training => (plan.ray_stage(gpu, workspace, &Link::of("select"))?, "training"),
+        Selection::Training => (plan.stage(gpu, workspace, &Link::of("select"), dispatch::RAYS)?, "training"),
         Selection::View => (viewing::select(gpu, plan, workspace)?, "view"),
     };
-    let kept = plan.ray_stage(gpu, workspace, &Link::of("kept").with("packing", packing))?;
-    let input = plan.kernel(gpu, &Link::of("color input"))?;
-    let input = Stage::indirect(workspace.bind(gpu, &input, &[])?, workspace.get("dispatch"), dispatch::KEPT);
+    let kept = plan.stage(gpu, workspace, &Link::of("kept").with("packing", packing), dispatch::RAYS)?;
+    let input = plan.stage(gpu, workspace, &Link::of("color input"), dispatch::KEPT)?;
     let mut stages = vec![select, scan(gpu, plan, workspace, Scanned::Kept)?, kept, input];
     stages.extend(network(gpu, plan, workspace)?);
     Ok(stages)
@@ -60,12 +59,11 @@ fn network(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> 
     let mut stages = Vec::new();
     for (number, layer) in layers.iter().enumerate() {
         let label = format!("color {number}");
-        let size = Size::Indirect(workspace.get("dispatch").clone(), dispatch::KEPT_TILES);
         let (store, output) =
             if number == last { ("color", "color") } else { ("hidden", COLOR_HIDDEN[number]) };
         let kernel = forward(gpu, plan, &label, layer, ["kept", store])?;
         let renamed = [("layer_input", source), ("layer_output", output)];
-        stages.push(layer_stage(gpu, workspace, &kernel, layer, &renamed, size)?);
+        stages.push(layer_stage(gpu, workspace, &kernel, layer, &renamed, dispatch::KEPT_TILES)?);
         source = output;
     }
     Ok(stages)

@@ -7,7 +7,7 @@ use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::demand::Demand;
 use crate::gpu::kernel::{Kernel, Resource};
-use crate::gpu::pass::{Size, Stage};
+use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
 
@@ -47,20 +47,17 @@ pub fn allocate_parameters(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) ->
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
-    let encode = plan.kernel(gpu, &Link::of("encode"))?;
-    let sizes = workspace.get("dispatch");
     let hidden = forward(gpu, plan, "density hidden", &plan.layout.density[0], ["samples", "hidden"])?;
     let out = forward(gpu, plan, "density out", &plan.layout.density[1], ["samples", "linear"])?;
-    let tiles = Size::Indirect(sizes.clone(), dispatch::SAMPLE_TILES);
     Ok(vec![
-        Stage::indirect(workspace.bind(gpu, &encode, &[])?, sizes, dispatch::ENCODE),
+        plan.stage(gpu, workspace, &Link::of("encode"), dispatch::ENCODE)?,
         layer_stage(
             gpu,
             workspace,
             &hidden,
             &plan.layout.density[0],
             &[("layer_input", "encoding"), ("layer_output", "density_hidden")],
-            tiles.clone(),
+            dispatch::SAMPLE_TILES,
         )?,
         layer_stage(
             gpu,
@@ -68,7 +65,7 @@ pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage
             &out,
             &plan.layout.density[1],
             &[("layer_input", "density_hidden"), ("layer_output", "density_out")],
-            tiles,
+            dispatch::SAMPLE_TILES,
         )?,
     ])
 }
@@ -94,7 +91,7 @@ pub fn quads(layer: &Layer) -> [(&'static str, usize); 2] {
     [("INPUT_QUADS", layer.inputs / 4), ("OUTPUT_QUADS", layer.outputs / 4)]
 }
 
-/// A layer's kernel bound to its weights and to the `renamed` buffers.
+/// A layer's kernel bound to its weights and to the `renamed` buffers, over one of [`dispatch`].
 ///
 /// # Errors
 /// When a buffer is missing.
@@ -104,10 +101,10 @@ pub fn layer_stage(
     kernel: &Kernel,
     layer: &Layer,
     renamed: &[(&str, &str)],
-    size: Size,
+    over: usize,
 ) -> Result<Stage> {
     let weights = weights(workspace.get("mlp"), layer);
-    Ok(Stage { bound: workspace.bind_with(gpu, kernel, renamed, &[weights])?, size })
+    workspace.stage(workspace.bind_with(gpu, kernel, renamed, &[weights])?, over)
 }
 
 fn weights<'a>(mlp: &'a Buffer, layer: &Layer) -> Resource<'a> {

@@ -65,16 +65,11 @@ pub fn stages_over(
     extent: Extent,
 ) -> Result<Vec<Stage>> {
     let jitter = if jitter { "on" } else { "off" };
-    let kernel = |label: &str| {
-        plan.kernel(gpu, &Link::of(label).with("jitter", jitter).with("extent", extent.variant()))
+    let over_rays = |label: &str| {
+        let link = Link::of(label).with("jitter", jitter).with("extent", extent.variant());
+        plan.stage(gpu, workspace, &link, dispatch::RAYS)
     };
-    let (march, samples) = (kernel("march")?, kernel("samples")?);
-    let sizes = workspace.get("dispatch");
-    Ok(vec![
-        Stage::indirect(workspace.bind(gpu, &march, &[])?, sizes, dispatch::RAYS),
-        scan(gpu, plan, workspace, Scanned::Samples)?,
-        Stage::indirect(workspace.bind(gpu, &samples, &[])?, sizes, dispatch::RAYS),
-    ])
+    Ok(vec![over_rays("march")?, scan(gpu, plan, workspace, Scanned::Samples)?, over_rays("samples")?])
 }
 
 /// What a scan packs.
@@ -102,7 +97,7 @@ pub fn scan(gpu: &Gpu, plan: &Plan, workspace: &Workspace, scanned: Scanned) -> 
     let link = Link::of_file(&format!("scan {variant}"), "scan");
     let link = link.with("scanned", variant).with("counted", "written").count("CAPACITY", capacity);
     let kernel = plan.kernel(gpu, &link)?;
-    Ok(Stage::fixed(workspace.bind(gpu, &kernel, &[("ray_spans", spans)])?, 1, 1))
+    Ok(Stage::single(workspace.bind(gpu, &kernel, &[("ray_spans", spans)])?))
 }
 
 /// Most kept samples of a step: half as much again as the target, since the number of rays follows it only

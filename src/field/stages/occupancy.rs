@@ -1,24 +1,24 @@
 //! Refreshing the occupancy grid from the density network.
 
-use crate::field::{Link, Plan, Workspace, density};
+use super::density;
+use crate::field::{Link, Plan, Workspace};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
-use crate::gpu::pass::{Size, Stage};
+use crate::gpu::pass::Stage;
 use anyhow::Result;
 
-/// The stages of an update: `chunk` runs once per chunk of cells, `bits` once at the end.
+/// The stages of an update.
 #[derive(Debug)]
 pub struct Update {
-    chunk: Vec<Stage>,
-    bits: Vec<Stage>,
-    level_pairs: usize,
-    rows_per_thread: usize,
+    /// Random positions in a chunk of cells.
+    samples: Stage,
+    /// The density there.
+    density: Vec<Stage>,
+    /// Raises the cells to it.
+    raise: Stage,
+    /// Values become bits, once all chunks are through.
+    bits: [Stage; 2],
 }
-
-// Positions in the list of stages of a chunk: samples, encode, two layers, update.
-const ENCODE: usize = 1;
-const ENCODE_END: usize = 2;
-const LAYERS_END: usize = 4;
 
 /// What only the update needs, for `visible` cells that can hold something.
 pub(crate) fn demands(visible: usize) -> Vec<Demand> {
@@ -31,37 +31,23 @@ impl Update {
     /// # Errors
     /// When a kernel cannot be built.
     pub fn new(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Self> {
-        let samples = Link::of("occupancy samples").with("counted", "written");
-        let samples = plan.kernel(gpu, &samples)?;
-        let update = plan.kernel(gpu, &Link::of("occupancy update"))?;
-        let mean = plan.kernel(gpu, &Link::of("occupancy mean"))?;
-        let bits = plan.kernel(gpu, &Link::of("occupancy bits"))?;
-        let mut chunk = vec![Stage::fixed(workspace.bind(gpu, &samples, &[])?, 1, 1)];
-        chunk.extend(density::stages(gpu, plan, workspace)?);
-        chunk.push(Stage::fixed(workspace.bind(gpu, &update, &[])?, 1, 1));
-        let words = plan.cell_count() / 32;
+        let bound = |link: &Link| workspace.bind(gpu, &plan.kernel(gpu, link)?, &[]);
         Ok(Self {
-            chunk,
-            bits: vec![
-                Stage::fixed(workspace.bind(gpu, &mean, &[])?, 1, 1),
-                Stage::wide(workspace.bind(gpu, &bits, &[])?, words.div_ceil(64)),
+            samples: Stage::single(bound(&Link::of("occupancy samples").with("counted", "written"))?),
+            density: density::stages(gpu, plan, workspace)?,
+            raise: Stage::single(bound(&Link::of("occupancy update"))?),
+            bits: [
+                Stage::single(bound(&Link::of("occupancy mean"))?),
+                Stage::wide(bound(&Link::of("occupancy bits"))?, plan.cell_count() / 32),
             ],
-            level_pairs: plan.layout.levels.len() / 2,
-            rows_per_thread: plan.product.rows,
         })
     }
 
     /// The stages for a chunk of `cells` cells.
-    pub fn chunk(&mut self, cells: usize) -> &[Stage] {
-        for (index, stage) in self.chunk.iter_mut().enumerate() {
-            let (per_group, rows) = match index {
-                ENCODE => (64, self.level_pairs),
-                ENCODE_END..LAYERS_END => (64 * self.rows_per_thread, 1),
-                _ => (64, 1),
-            };
-            stage.size = Size::Fixed(cells.div_ceil(per_group) as u32, rows as u32);
-        }
-        &self.chunk
+    pub fn chunk(&mut self, cells: usize) -> impl Iterator<Item = &Stage> {
+        self.samples.resize(cells);
+        self.raise.resize(cells);
+        [&self.samples].into_iter().chain(&self.density).chain([&self.raise])
     }
 
     /// The stages that turn values into bits.

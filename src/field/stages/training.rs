@@ -9,7 +9,7 @@ use crate::field::{Link, Plan, RayResult, RayTarget, Workspace, dispatch, record
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::kernel::Kernel;
-use crate::gpu::pass::{Size, Stage};
+use crate::gpu::pass::Stage;
 use crate::gpu::tensor::{Element, Memory};
 use crate::gpu_struct;
 use anyhow::Result;
@@ -68,7 +68,7 @@ pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
 /// When the kernel cannot be built.
 pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
     let link = Link::of("rays").part(records::NAME, workspace.banks_part()?);
-    plan.ray_stage(gpu, workspace, &link)
+    plan.stage(gpu, workspace, &link, dispatch::RAYS)
 }
 
 /// The fused render, loss and gradient kernel.
@@ -77,7 +77,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -> Result<Stage> {
     let weights = if weights { "stored" } else { "none" };
-    plan.ray_stage(gpu, workspace, &Link::of("composite").with("weights", weights))
+    plan.stage(gpu, workspace, &Link::of("composite").with("weights", weights), dispatch::RAYS)
 }
 
 /// Gradients of all activations, from the colour back to the encoding.
@@ -128,8 +128,7 @@ fn backward_layer(
     let link = Link::of_text(label, plan.product.backward(shape.inputs, wanted, shape.outputs));
     let link = link.with("layer_count", "kept").with("layer_gradient", gradient).with("layer_d_store", store);
     let kernel = plan.kernel(gpu, &link.counts(&quads(shape)))?;
-    let size = Size::Indirect(workspace.get("dispatch").clone(), dispatch::KEPT_TILES);
-    layer_stage(gpu, workspace, &kernel, shape, renamed, size)
+    layer_stage(gpu, workspace, &kernel, shape, renamed, dispatch::KEPT_TILES)
 }
 
 /// Gradients of all weights.
@@ -163,8 +162,8 @@ pub fn weight_gradients(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result
             let uniform = gpu.uniform("tile", &tile)?;
             let renamed = [("layer_input", input), ("d_output", d_output)];
             let bound = workspace.bind_with(gpu, kernel, &renamed, &[uniform.resource()])?;
-            let groups = plan.product.weight_gradient_groups(shape.inputs, shape.outputs / 4, plan.chunks);
-            stages.push(Stage::fixed(bound, groups, 1));
+            let threads = plan.product.weight_gradient_threads(shape.inputs, shape.outputs / 4, plan.chunks);
+            stages.push(Stage::over(bound, threads));
         }
     }
     Ok(stages)
@@ -190,18 +189,17 @@ pub fn update(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage
     let table = bind(&Link::of("adam table"))?;
     let mlp = bind(&Link::of("adam mlp"))?;
     let finish = bind(&Link::of("finish").with("counted", "written"))?;
-    let sizes = workspace.get("dispatch");
     let scatter = match plan.accumulation {
-        Accumulation::Ordered => Stage::fixed(scatter, plan.layout.levels.len() / 8, 1),
-        _ => Stage::indirect(scatter, sizes, dispatch::KEPT),
+        Accumulation::Ordered => Stage::over(scatter, plan.layout.levels.len()),
+        _ => workspace.stage(scatter, dispatch::KEPT)?,
     };
     Ok(vec![
-        Stage::indirect(range, sizes, dispatch::KEPT),
-        Stage::fixed(sums, plan.layout.quads.div_ceil(8), 1),
+        workspace.stage(range, dispatch::KEPT)?,
+        Stage::over(sums, plan.layout.quads),
         scatter,
-        Stage::wide(table, plan.layout.entries.div_ceil(128)),
-        Stage::fixed(mlp, plan.layout.quads.div_ceil(8), 1),
-        Stage::fixed(finish, 1, 1),
+        Stage::wide(table, plan.layout.entries.div_ceil(2)),
+        Stage::over(mlp, plan.layout.quads),
+        Stage::single(finish),
     ])
 }
 

@@ -1,6 +1,6 @@
 //! What only rendering needs: how much of a view is in work at once, its rays and their compositing.
 
-use crate::field::{Camera, Link, Needs, Plan, Progress, Traits, Workspace};
+use crate::field::{Camera, Link, Needs, Plan, Progress, Traits, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
@@ -65,7 +65,7 @@ pub fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    plan.ray_stage(gpu, workspace, &Link::of("view rays"))
+    plan.stage(gpu, workspace, &Link::of("view rays"), dispatch::RAYS)
 }
 
 /// Chooses the samples that get colour.
@@ -73,7 +73,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// # Errors
 /// When the kernel cannot be built.
 pub(crate) fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    plan.ray_stage(gpu, workspace, &Link::of("view select"))
+    plan.stage(gpu, workspace, &Link::of("view select"), dispatch::RAYS)
 }
 
 /// Adds their colours, and writes the pixels of rays that ended.
@@ -81,5 +81,5 @@ pub(crate) fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<St
 /// # Errors
 /// When the kernel cannot be built.
 pub fn composite(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    plan.ray_stage(gpu, workspace, &Link::of("view composite"))
+    plan.stage(gpu, workspace, &Link::of("view composite"), dispatch::RAYS)
 }

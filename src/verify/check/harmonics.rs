@@ -25,8 +25,7 @@ pub fn harmonics(subject: &Subject) -> Result<Tally> {
     bench.write("density_out", &features);
     bench.write("kept_rows", &rows);
     bench.set_counters(Counters { kept: count as u32, ..Counters::default() });
-    let groups = [[count.div_ceil(64) as u32, 1, 1, 0]];
-    bench.gpu.write(bench.workspace.get("dispatch"), dispatch::KEPT, &groups);
+    bench.workspace.set_dispatch(&bench.gpu, dispatch::KEPT, count);
     let stages = color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::Selection::Training)?;
     bench.run_only(&stages, "color input")?;
     let inputs: Vec<f32> = bench.read("color_input", count * COLOR_INPUTS)?;

@@ -119,8 +119,7 @@ impl Workbench {
     /// Sets what is counted on the device, and the size of the dispatches over rays.
     pub fn set_counters(&self, counters: Counters) {
         self.write("counters", &[counters]);
-        let groups = [[counters.rays.div_ceil(64).max(1), 1, 1, 0]];
-        self.gpu.write(self.workspace.get("dispatch"), dispatch::RAYS, &groups);
+        self.workspace.set_dispatch(&self.gpu, dispatch::RAYS, counters.rays as usize);
     }
 
     /// Sets the number of rays to draw or march; nothing else is counted.
