@@ -2,11 +2,12 @@
 
 use super::field::Field;
 use super::scores::{Compared, Judge, Means, Score, describe_near, warn_of_fog};
-use super::{Session, find_frames, open_to_compare, writable_folder};
+use super::{Session, find_frames, open_to_compare};
 use crate::cli::Eval;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
 use nerf::dataset::{Dataset, Split};
+use nerf::file::writable_folder;
 use nerf::image::write_png_rgba8;
 use nerf::picture::{ColorSpace, opaque_srgb8};
 use nerf::words::{count, few};

@@ -1,13 +1,13 @@
 //! `nerf render`: a trained field seen from any cameras.
 
+use super::Session;
 use super::field::Field;
-use super::{Session, writable_folder};
 use crate::cli::{Format, PictureBackground, Render};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use nerf::camera::{Camera, LensKind};
 use nerf::dataset::{Bounds, read_cameras};
-use nerf::file::write_atomically;
+use nerf::file::{writable_folder, write_atomically};
 use nerf::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::picture::{ColorSpace, depth_srgb8, opaque_srgb8};
 use nerf::render::{Renderer, View};

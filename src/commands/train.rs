@@ -11,7 +11,7 @@ pub(super) mod stages;
 
 use super::exam::Exam;
 use super::scores::warn_of_fog;
-use super::{Session, report, writable_folder};
+use super::{Session, report};
 use crate::cli::Train;
 use crate::progress::duration;
 use anyhow::Result;
@@ -19,6 +19,7 @@ use course::{Course, End};
 use folder::RunFolder;
 use nerf::checkpoint::About;
 use nerf::dataset::{Dataset, OpenOptions};
+use nerf::file::writable_folder;
 use nerf::health::{Severity, Survey};
 use nerf::report::views::TestViews;
 use nerf::schedule::Budget;

@@ -3,18 +3,19 @@
 mod curve;
 mod picture;
 
-use super::{circumstances, joined, markdown, optional, quoted, write_csv, write_json, write_text};
 use crate::cli::bench::Training;
+use crate::commands::Session;
 use crate::commands::exam::Exam;
 use crate::commands::train::pace::Pace;
 use crate::commands::train::photos;
 use crate::commands::train::setup::{Setup, Wishes};
-use crate::commands::{Session, writable_folder};
 use crate::progress::short;
 use anyhow::{Context, Result, ensure};
 use curve::{Curve, follow};
 use nerf::dataset::{Dataset, OpenOptions};
+use nerf::file::writable_folder;
 use nerf::gpu::Gpu;
+use nerf::results::{circumstances, joined, markdown, optional, quoted, write_csv, write_json, write_text};
 use nerf::schedule::Budget;
 use nerf::train::Trainer;
 use serde::Serialize;
