@@ -8,7 +8,7 @@
 # environment:
 #   SECONDS_EACH   of the trainings behind the curves [default: 120]
 #   NERF_ADAPTER   what --adapter takes
-#   NERF           binary to use instead of building it
+#   NERF, STUDIES  binaries to use instead of building them
 set -euo pipefail
 
 if [ $# -lt 1 ]; then
@@ -24,6 +24,10 @@ for dataset in "$@"; do
 done
 cd "$(dirname "$0")/.."
 nerf=${NERF:-${CARGO_TARGET_DIR:-target}/release/nerf}
+studies=("${STUDIES:-}")
+if [ -z "${STUDIES:-}" ]; then
+    studies=(cargo bench --quiet --locked --bench studies --)
+fi
 if [ -z "${NERF:-}" ]; then
     scripts/setup.sh
     cargo build --release --locked
@@ -37,6 +41,11 @@ failed=
 # A command on the adapter asked for.
 on_adapter() {
     "$nerf" "$@" ${NERF_ADAPTER:+--adapter "$NERF_ADAPTER"} --quiet
+}
+
+# A study on that adapter.
+study() {
+    "${studies[@]}" "$@" --out "$out" ${NERF_ADAPTER:+--adapter "$NERF_ADAPTER"}
 }
 
 # One table of nerf check; what the adapter cannot do is said and left out.
@@ -61,8 +70,8 @@ for vectors in tests/vectors/*.json; do
     check "$(basename "$vectors")" --vectors "$vectors"
 done
 
-on_adapter bench equations --out "$out" >"$work/equations.txt"
-on_adapter bench quadrature --out "$out" >"$out/quadrature.txt"
+study equations >"$work/equations.txt"
+study quadrature >"$out/quadrature.txt"
 
 on_adapter generate toys --out "$work/toys" --views 100 --size 100
 for dataset in "$work/toys" ${datasets[@]+"${datasets[@]}"}; do

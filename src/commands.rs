@@ -16,7 +16,7 @@ mod train;
 use crate::cli::reading::Reading;
 use crate::cli::{Cli, Command, Global};
 use crate::remarks::Remarks;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::field::checkpoint::About;
 use nerf::gpu::{Gpu, adapter};
@@ -82,15 +82,6 @@ impl Session<'_> {
         }
         Ok(out.flush()?)
     }
-}
-
-/// Creates the folder where there is none, and tries whether files can be written to it.
-fn writable_folder(path: &Path) -> Result<()> {
-    let show = path.display();
-    std::fs::create_dir_all(path).with_context(|| format!("creating the folder {show}"))?;
-    let attempt = tempfile::Builder::new().prefix(".nerf-").tempfile_in(path);
-    attempt.with_context(|| format!("the folder {show} cannot be written to"))?;
-    Ok(())
 }
 
 /// Opens a dataset to compare a field with: the photos are read as the command line says, else as for the training.

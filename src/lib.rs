@@ -71,7 +71,6 @@ pub mod config;
 pub mod field;
 pub mod gpu;
 pub mod photo;
-pub mod quadrature;
 pub mod run;
 pub mod support;
 pub mod verify;

@@ -1,7 +1,18 @@
-//! `nerf bench` on whatever adapter there is: small, and everything it writes read again.
+//! `nerf bench` and the studies of `benches/studies` on whatever adapter there is: small, and everything they write read
+//! again.
+
+#[path = "studies/medium.rs"]
+mod medium;
+#[path = "studies/order.rs"]
+mod order;
+#[path = "studies/stiff.rs"]
+mod stiff;
+#[allow(dead_code, reason = "the tests ask for parts of it, and not for its `main`")]
+#[path = "../benches/studies/main.rs"]
+mod studies;
 
 use assert_cmd::Command;
-use predicates::prelude::*;
+use clap::Parser;
 use predicates::str::contains;
 use serde_json::Value;
 use std::fs;
@@ -18,6 +29,12 @@ fn nerf(args: &[&str]) -> Command {
 fn object(args: &[&str]) -> Value {
     let assert = nerf(args).arg("--json").assert().success();
     serde_json::from_slice(&assert.get_output().stdout).expect("one JSON value")
+}
+
+/// What a study finds, with the arguments of its command line.
+fn study(args: &[&str]) -> anyhow::Result<studies::Outcome> {
+    let args = studies::Args::parse_from([&["studies"], args].concat());
+    args.study.expect("a study").run(None)
 }
 
 fn text(path: &Path) -> &str {
@@ -123,14 +140,14 @@ fn trainings_that_cannot_be_compared_are_refused_at_once() {
     fails(&["--config", SMOKE, "--config", "nothing.json"], 1, "nothing.json");
     fails(&["--seeds", "2", "--seed", "1"], 2, "cannot be used with");
     fails(&["--seeds", "0"], 2, "--seeds");
-    nerf(&["bench"]).assert().code(2).stderr(contains("training").and(contains("quadrature")));
+    nerf(&["bench"]).assert().code(2).stderr(contains("training"));
 }
 
 #[test]
 fn quadrature_converges_as_the_mathematics_says() {
     let out = folder("quadrature");
-    let args = ["bench", "quadrature", "--out", text(&out), "--rays", "24", "--repeats", "1"];
-    let summary = object(&args);
+    let args = ["quadrature", "--out", text(&out), "--rays", "24", "--repeats", "1"];
+    let summary = study(&args).expect("a result").json;
     let order = |medium: &str, sum: &str, quantity: &str, of: &str| -> f64 {
         let orders = summary["orders"].as_array().expect("orders");
         let found = orders.iter().find(|order| {
@@ -166,7 +183,7 @@ fn quadrature_converges_as_the_mathematics_says() {
 #[test]
 fn equations_differ_as_printed() {
     let out = folder("equations");
-    let result = object(&["bench", "equations", "--out", text(&out)]);
+    let result = study(&["equations", "--out", text(&out)]).expect("a result").json;
     let slabs = result["slabs"].as_array().expect("slabs");
     assert_eq!(slabs.len(), 3 * 11);
     for slab in slabs {
@@ -185,7 +202,8 @@ fn equations_differ_as_printed() {
     assert!(printed.contains("| samples |") && printed.contains("stiff wall behind fog"));
 
     let vectors = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/vectors/composite_inclusive.json");
-    let assert = nerf(&["bench", "equations", "--vectors", vectors]).assert().success();
-    assert.stdout(contains("long ray").and(contains("not finite")));
-    nerf(&["bench", "equations", "--vectors", "none.json"]).assert().code(1).stderr(contains("none.json"));
+    let golden = study(&["equations", "--vectors", vectors]).expect("a result").text;
+    assert!(golden.contains("long ray") && golden.contains("not finite"));
+    let missing = study(&["equations", "--vectors", "none.json"]).expect_err("no such file");
+    assert!(format!("{missing:#}").contains("none.json"));
 }

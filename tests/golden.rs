@@ -1,11 +1,14 @@
 //! The f64 reference against golden rays, computed in 60-digit arithmetic from the defining sums.
 
+#[path = "../benches/studies/equations/textbook.rs"]
+mod textbook;
+
 use std::path::Path;
 
 use nerf::verify::reference::Transmittance;
 use nerf::verify::reference::composite::composite;
-use nerf::verify::reference::textbook::{Precision, textbook_d_s};
 use nerf::verify::reference::vectors::{Expected, GoldenFile, NOT_FINITE, RayError};
+use textbook::{Precision, textbook_d_s};
 
 const CONVENTIONS: [Transmittance; 2] = [Transmittance::Exclusive, Transmittance::Inclusive];
 

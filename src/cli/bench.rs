@@ -8,10 +8,6 @@ use std::path::PathBuf;
 pub(crate) enum Bench {
     /// Test PSNR against seconds of training, for several configs and seeds
     Training(Training),
-    /// Error of rendered rays against the step, where the exact integral is known
-    Quadrature(Quadrature),
-    /// The two sums of the transmittance on thick slabs, and two forms of the gradient on stiff rays
-    Equations(Equations),
 }
 
 /// `nerf bench training`
@@ -43,29 +39,4 @@ pub(crate) struct Training {
     /// Test views to measure along the way, evenly spaced; the end measures all
     #[arg(long, value_name = "N", default_value = "4", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) views: u32,
-}
-
-/// `nerf bench quadrature`
-#[derive(Args, Debug)]
-pub(crate) struct Quadrature {
-    /// Folder to write quadrature.json, quadrature.csv and quadrature.svg to
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
-    /// Rays with different phases of their samples
-    #[arg(long, value_name = "N", default_value = "4096", value_parser = clap::value_parser!(u32).range(1..=65_536))]
-    pub(crate) rays: u32,
-    /// Times that each batch is run; its time is the median
-    #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) repeats: u32,
-}
-
-/// `nerf bench equations`
-#[derive(Args, Debug)]
-pub(crate) struct Equations {
-    /// Folder to write equations.json and equations.md to
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: Option<PathBuf>,
-    /// File of golden rays; may be repeated [default: rays computed in 64 bits]
-    #[arg(long, value_name = "FILE")]
-    pub(crate) vectors: Vec<PathBuf>,
 }

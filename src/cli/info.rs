@@ -10,8 +10,8 @@ use std::path::PathBuf;
 pub(crate) struct Info {
     /// A folder with transforms.json or transforms_train.json, or such a file
     pub(crate) dataset: PathBuf,
-    /// Draw the cameras from above and from the side, to a .svg or .png file
-    #[arg(long, value_name = "FILE", value_parser = picture)]
+    /// Draw the cameras from above and from the side, to a .svg file
+    #[arg(long, value_name = "FILE.svg", value_parser = map)]
     pub(crate) plot: Option<PathBuf>,
     /// Do not decode the photos to look for blurred, dark, bright and repeated ones
     #[arg(long)]
@@ -24,10 +24,12 @@ pub(crate) struct Info {
     pub(crate) reading: Reading,
 }
 
-fn picture(text: &str) -> Result<PathBuf, String> {
+fn map(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
-    let is_known = path
-        .extension()
-        .is_some_and(|end| ["svg", "png"].iter().any(|known| end.eq_ignore_ascii_case(known)));
-    is_known.then_some(path).ok_or_else(|| "expected a file name that ends in .svg or .png".to_owned())
+    let is_svg = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("svg"));
+    is_svg.then_some(path).ok_or_else(|| {
+        format!(
+            "expected a name that ends in .svg, found '{text}'; name an SVG file, which any browser shows"
+        )
+    })
 }

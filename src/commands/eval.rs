@@ -2,7 +2,7 @@
 
 use super::field::Field;
 use super::scores::{Compared, Judge, Means, Score, describe_near, warn_of_fog};
-use super::{Session, find_frames, open_to_compare, writable_folder};
+use super::{Session, find_frames, open_to_compare};
 use crate::cli::Eval;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
@@ -10,6 +10,7 @@ use nerf::capture::dataset::Dataset;
 use nerf::capture::image::write_png_rgba8;
 use nerf::photo::Split;
 use nerf::photo::color::{ColorSpace, opaque_srgb8};
+use nerf::support::file::writable_folder;
 use nerf::support::format::{count, few};
 use serde_json::{Value, json};
 

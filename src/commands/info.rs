@@ -11,20 +11,15 @@ use crate::progress::Progress;
 use anyhow::Result;
 use memory::Estimate;
 use nerf::capture::dataset::{Dataset, OpenOptions};
-use nerf::capture::health::map::{self, Drawing};
+use nerf::capture::health::map;
 use nerf::capture::health::photos::{Gallery, Look};
 use nerf::capture::health::{Finding, Severity, Survey};
-use nerf::capture::image::write_png_rgba8;
 use nerf::photo::Reading;
 use nerf::support::file::write_atomically;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::io::Write;
-use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// Pixels of a PNG along a unit of the drawing.
-const PIXELS_PER_UNIT: f32 = 1.5;
 
 /// All there is to say about a dataset.
 #[derive(Debug)]
@@ -57,7 +52,8 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
         let marked = (report.problems.iter().filter(|problem| problem.severity != Severity::Note))
             .flat_map(|problem| problem.frames.iter().copied());
         let drawing = map::draw(&dataset, &report.survey, &marked.collect());
-        plot(path, &drawing).map_err(|error| Failed(format!("{error:#}")))?;
+        let written = write_atomically(path, |file| Ok(file.write_all(drawing.svg().as_bytes())?));
+        written.map_err(|error| Failed(format!("{error:#}")))?;
     }
     match report.problems.first().filter(|problem| problem.severity == Severity::Error) {
         Some(problem) => Err(Failed(format!("a training would fail: {}", problem.message)).into()),
@@ -100,14 +96,6 @@ fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, 
     let (looks, failures): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);
     let looks = looks.into_iter().filter_map(Result::ok).collect();
     (Gallery { looks }, failures.into_iter().filter_map(Result::err).collect())
-}
-
-fn plot(path: &Path, drawing: &Drawing) -> Result<()> {
-    if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")) {
-        let picture = drawing.pixels(PIXELS_PER_UNIT)?;
-        return write_png_rgba8(path, picture.width, picture.height, &picture.pixels);
-    }
-    write_atomically(path, |file| Ok(file.write_all(drawing.svg().as_bytes())?))
 }
 
 /// The result for what cannot even be opened.

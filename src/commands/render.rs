@@ -1,7 +1,7 @@
 //! `nerf render`: a trained field seen from any cameras.
 
+use super::Session;
 use super::field::Field;
-use super::{Session, writable_folder};
 use crate::cli::{Format, PictureBackground, Render};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
@@ -11,7 +11,7 @@ use nerf::capture::dataset::read_cameras;
 use nerf::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::field::render::{Renderer, View};
 use nerf::photo::color::{ColorSpace, depth_srgb8, opaque_srgb8};
-use nerf::support::file::write_atomically;
+use nerf::support::file::{writable_folder, write_atomically};
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::panic::resume_unwind;

@@ -11,7 +11,7 @@ pub(super) mod stages;
 
 use super::exam::Exam;
 use super::scores::warn_of_fog;
-use super::{Session, report, writable_folder};
+use super::{Session, report};
 use crate::cli::Train;
 use crate::progress::duration;
 use anyhow::Result;
@@ -23,6 +23,7 @@ use nerf::config::schedule::Budget;
 use nerf::field::checkpoint::About;
 use nerf::field::train::Trainer;
 use nerf::run::report::views::TestViews;
+use nerf::support::file::writable_folder;
 use pace::Pace;
 use serde_json::json;
 use setup::{Setup, Wishes};

@@ -32,7 +32,7 @@ const FINE: u32 = 4;
 const TITLE: u32 = 15;
 const TEXT: u32 = 12;
 /// Mean width of a character, as a part of the font size.
-const CHARACTER: f64 = 0.56;
+pub(crate) const CHARACTER: f64 = 0.56;
 /// Length of a legend's line and the spaces around it, in pixels.
 const SAMPLE: u32 = 20;
 const GAP: u32 = 6;
@@ -312,7 +312,8 @@ fn clean(text: &str) -> String {
     text.chars().filter(|c| !c.is_control() && !matches!(c, '\u{fffe}' | '\u{ffff}')).collect()
 }
 
-fn escaped(text: &str) -> String {
+/// The text between tags or in an attribute.
+pub(crate) fn escaped(text: &str) -> String {
     let text = clean(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     text.replace('"', "&quot;")
 }

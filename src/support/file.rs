@@ -26,6 +26,15 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) ->
     attempt().with_context(|| format!("writing {}", path.display()))
 }
 
+/// Creates the folder where there is none, and tries whether files can be written to it.
+pub fn writable_folder(path: &Path) -> Result<()> {
+    let show = path.display();
+    std::fs::create_dir_all(path).with_context(|| format!("creating the folder {show}"))?;
+    let attempt = tempfile::Builder::new().prefix(".nerf-").tempfile_in(path);
+    attempt.with_context(|| format!("the folder {show} cannot be written to"))?;
+    Ok(())
+}
+
 fn temporary_in(folder: &Path) -> Result<tempfile::NamedTempFile> {
     ensure!(folder.is_dir(), "the folder {} does not exist", folder.display());
     let mut builder = tempfile::Builder::new();

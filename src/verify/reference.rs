@@ -25,7 +25,6 @@ pub mod occupancy;
 pub mod random;
 pub mod selection;
 pub mod step;
-pub mod textbook;
 pub mod vectors;
 
 /// Which optical depths the transmittance `T_i` of a sample sums up.

@@ -2,10 +2,8 @@
 
 mod drawing;
 mod panel;
-mod pixels;
 
 pub use drawing::Drawing;
-pub use pixels::Picture;
 
 use super::{Spread, Survey};
 use crate::camera::Bounds;

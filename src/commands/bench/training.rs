@@ -3,13 +3,12 @@
 mod curve;
 mod picture;
 
-use super::{circumstances, joined, markdown, optional, quoted, write_csv, write_json, write_text};
 use crate::cli::bench::Training;
+use crate::commands::Session;
 use crate::commands::exam::Exam;
 use crate::commands::train::pace::Pace;
 use crate::commands::train::photos;
 use crate::commands::train::setup::{Setup, Wishes};
-use crate::commands::{Session, writable_folder};
 use crate::progress::short;
 use anyhow::{Context, Result, ensure};
 use curve::{Curve, follow};
@@ -17,6 +16,10 @@ use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::config::schedule::Budget;
 use nerf::field::train::Trainer;
 use nerf::gpu::Gpu;
+use nerf::support::file::writable_folder;
+use nerf::support::results::{
+    circumstances, joined, markdown, optional, quoted, write_csv, write_json, write_text,
+};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;

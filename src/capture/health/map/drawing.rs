@@ -1,6 +1,6 @@
 //! Lines, surfaces and words on a plane, and how they are written as SVG.
 
-use super::pixels::text_width;
+use crate::support::chart::{CHARACTER, escaped};
 use glam::DVec2;
 use std::fmt::Write;
 
@@ -8,24 +8,24 @@ use std::fmt::Write;
 #[derive(Clone, Debug)]
 pub struct Drawing {
     /// Width and height in drawing units, +y down.
-    pub(super) size: DVec2,
-    pub(super) ground: Color,
-    pub(super) shapes: Vec<Shape>,
+    size: DVec2,
+    ground: Color,
+    shapes: Vec<Shape>,
 }
 
 /// A display-referred colour with an opacity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Color {
-    pub(super) rgb: [u8; 3],
-    pub(super) opacity: f64,
+    rgb: [u8; 3],
+    opacity: f64,
 }
 
 /// How a line is drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stroke {
     pub(super) color: Color,
-    pub(super) width: f64,
-    pub(super) is_dashed: bool,
+    width: f64,
+    is_dashed: bool,
 }
 
 /// Which end of a text lies at its point.
@@ -38,21 +38,18 @@ pub(super) enum Anchor {
 
 #[derive(Clone, Debug)]
 pub(super) struct Shape {
-    pub(super) outline: Outline,
-    pub(super) fill: Option<Color>,
-    pub(super) stroke: Option<Stroke>,
+    outline: Outline,
+    fill: Option<Color>,
+    stroke: Option<Stroke>,
 }
 
 #[derive(Clone, Debug)]
-pub(super) enum Outline {
+enum Outline {
     Open(Vec<DVec2>),
     Closed(Vec<DVec2>),
     Circle(DVec2, f64),
     Text { at: DVec2, text: String, size: f64, anchor: Anchor },
 }
-
-/// Length of a dash and of the gap after it.
-pub(super) const DASH: [f64; 2] = [6.0, 4.0];
 
 impl Color {
     pub(super) const fn rgb(r: u8, g: u8, b: u8) -> Self {
@@ -117,7 +114,7 @@ impl Shape {
             style += &stroke.color.attributes("stroke");
             style += &format!(" stroke-width=\"{}\"", stroke.width);
             if stroke.is_dashed {
-                style += &format!(" stroke-dasharray=\"{} {}\"", DASH[0], DASH[1]);
+                style += " stroke-dasharray=\"6 4\"";
             }
         }
         // Writing to a String cannot fail.
@@ -151,10 +148,6 @@ fn listed(points: &[DVec2]) -> String {
     points.join(" ")
 }
 
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
 impl Drawing {
     pub(super) fn new(size: DVec2, ground: Color) -> Self {
         Self { size, ground, shapes: Vec::new() }
@@ -164,12 +157,12 @@ impl Drawing {
         self.shapes.push(shape);
     }
 
-    /// Writes words with the ground around them; returns where they end.
+    /// Writes words with the ground around them; returns about where they end, as the font is the viewer's.
     pub(super) fn text(&mut self, at: DVec2, text: &str, size: f64, color: Color, anchor: Anchor) -> f64 {
         let outline = Outline::Text { at, text: text.to_owned(), size, anchor };
         let halo = Stroke::new(self.ground, 0.28 * size);
         self.push(Shape::of(outline).filled(color).with(halo));
-        at.x + text_width(text, size)
+        at.x + CHARACTER * size * text.chars().count() as f64
     }
 
     /// The drawing as an SVG file.
@@ -178,7 +171,7 @@ impl Drawing {
         let (width, height) = (self.size.x, self.size.y);
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
-             height=\"{height}\" font-family=\"Noto Sans, sans-serif\" stroke-linejoin=\"round\" \
+             height=\"{height}\" font-family=\"sans-serif\" stroke-linejoin=\"round\" \
              stroke-linecap=\"round\">\n<rect width=\"{width}\" height=\"{height}\"{}/>\n",
             self.ground.attributes("fill")
         );

@@ -1,24 +1,43 @@
-//! `nerf bench quadrature`: work and precision of the compositing kernels on rays whose integrals are known.
+//! Work and precision of the compositing kernels on rays whose integrals are known.
 
 mod device;
+pub(crate) mod medium;
+pub(crate) mod order;
 mod picture;
 
-use super::{circumstances, joined, markdown, optional, write_csv, write_json, write_text};
-use crate::cli::bench::Quadrature;
-use crate::commands::{Session, writable_folder};
-use crate::progress::Progress;
+use super::{Outcome, say};
 use anyhow::Result;
+use clap::Args;
 use device::{Device, Variant, name};
-use nerf::quadrature::order::{Order, Point, order};
-use nerf::quadrature::{Medium, Rms, Samples, phase};
+use medium::{Medium, Rms, Samples, phase};
+use nerf::gpu::Gpu;
+use nerf::support::file::writable_folder;
+use nerf::support::results::{circumstances, joined, markdown, optional, write_csv, write_json, write_text};
+use order::{Order, Point, order};
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Powers of two: 4 to 1024 steps.
 const POWERS: std::ops::RangeInclusive<u32> = 2..=10;
 /// What f64 sums round to.
 const DOUBLE_ROUNDING: f64 = 1e-14;
+
+/// `quadrature`
+#[derive(Args, Debug)]
+pub(crate) struct Quadrature {
+    /// Folder to write quadrature.json, quadrature.csv and quadrature.svg to
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Rays with different phases of their samples
+    #[arg(long, value_name = "N", default_value = "4096", value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    rays: u32,
+    /// Times that each batch is run; its time is the median
+    #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeats: u32,
+}
 
 /// Errors and time of one variant, with one number of steps.
 #[derive(Clone, Debug, Serialize)]
@@ -54,23 +73,19 @@ struct Measured {
     reference: Option<Order>,
 }
 
-pub(super) fn run(args: &Quadrature, session: &Session<'_>) -> Result<()> {
-    let gpu = session.open_gpu()?;
+pub(crate) fn run(args: &Quadrature, gpu: &Arc<Gpu>) -> Result<Outcome> {
     writable_folder(&args.out)?;
-    let mut device = Device::new(&gpu, args.rays as usize, 1 << POWERS.end(), args.repeats)?;
-    let progress = Progress::new(session.remarks, "integrating");
-    let count = Medium::ALL.len() * POWERS.count();
+    let mut device = Device::new(gpu, args.rays as usize, 1 << POWERS.end(), args.repeats)?;
     let mut rows = Vec::new();
-    for (number, (medium, power)) in
-        Medium::ALL.into_iter().flat_map(|medium| POWERS.map(move |power| (medium, power))).enumerate()
-    {
-        rows.extend(measure(&mut device, medium, 1 << power)?);
-        progress.count(number + 1, count, "batches");
+    for medium in Medium::ALL {
+        say(&format!("integrating: {}", medium.description()));
+        for power in POWERS {
+            rows.extend(measure(&mut device, medium, 1 << power)?);
+        }
     }
-    drop(progress);
     let orders = orders(&rows);
     let about = joined(
-        circumstances(&gpu),
+        circumstances(gpu),
         json!({
             "rays": args.rays,
             "repeats": args.repeats,
@@ -87,7 +102,7 @@ pub(super) fn run(args: &Quadrature, session: &Session<'_>) -> Result<()> {
     write_json(&args.out.join("quadrature.json"), &joined(about.clone(), json!({ "rows": rows })))?;
     csv(&args.out.join("quadrature.csv"), &rows)?;
     write_text(&args.out.join("quadrature.svg"), &picture::picture(&rows)?)?;
-    session.print(&about, &table(&orders))
+    Ok(Outcome { json: about, text: table(&orders) })
 }
 
 /// All variants of one medium with one number of steps; the rays go through the device in chunks.
@@ -179,7 +194,7 @@ fn orders(rows: &[Row]) -> Vec<Measured> {
     orders
 }
 
-fn csv(path: &std::path::Path, rows: &[Row]) -> Result<()> {
+fn csv(path: &Path, rows: &[Row]) -> Result<()> {
     let header = "medium,transmittance,early_stop,steps,color_error,opacity_error,color_error_f64,opacity_error_f64,\
                   color_rounding,opacity_rounding,kept_per_ray,seconds";
     let line = |row: &Row| {

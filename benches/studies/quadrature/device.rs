@@ -1,5 +1,6 @@
 //! The kernels from selection to compositing, on rays whose densities and colours are given.
 
+use super::medium::Samples;
 use anyhow::{Context, Result, ensure};
 use glam::DVec3;
 use nerf::config;
@@ -7,14 +8,13 @@ use nerf::field::{color, training};
 use nerf::gpu::Gpu;
 use nerf::gpu::pass::Stage;
 use nerf::gpu::timer::Timer;
-use nerf::quadrature::Samples;
 use nerf::verify::check::{Setup, Workbench};
 use nerf::verify::reference::Transmittance;
 use nerf::verify::reference::model::{RaySample, TrainingRay};
 use std::sync::Arc;
 
 /// The transmittance of the early stop, that of a training.
-pub(super) const STOP: f64 = 1e-4;
+pub(crate) const STOP: f64 = 1e-4;
 /// Samples on the device at once: about 700 bytes each, and on a GPU enough to fill it.
 const SAMPLES_ON_CPU: usize = 1 << 18;
 const SAMPLES_ON_GPU: usize = 1 << 20;
@@ -23,16 +23,16 @@ const SELECTING: [&str; 3] = ["select", "scan kept", "kept"];
 
 /// A way to composite.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Variant {
+pub(crate) struct Variant {
     /// The convention.
-    pub(super) transmittance: Transmittance,
+    pub(crate) transmittance: Transmittance,
     /// Whether a ray ends where its transmittance falls below [`STOP`].
-    pub(super) early_stop: bool,
+    pub(crate) early_stop: bool,
 }
 
 impl Variant {
     /// All of them.
-    pub(super) const ALL: [Self; 4] = [
+    pub(crate) const ALL: [Self; 4] = [
         Self { transmittance: Transmittance::Exclusive, early_stop: false },
         Self { transmittance: Transmittance::Inclusive, early_stop: false },
         Self { transmittance: Transmittance::Exclusive, early_stop: true },
@@ -40,13 +40,13 @@ impl Variant {
     ];
 
     /// The transmittance below which a ray ends.
-    pub(super) fn stop(self) -> f64 {
+    pub(crate) fn stop(self) -> f64 {
         if self.early_stop { STOP } else { 0.0 }
     }
 }
 
 /// The convention's name in tables and files.
-pub(super) fn name(transmittance: Transmittance) -> &'static str {
+pub(crate) fn name(transmittance: Transmittance) -> &'static str {
     match transmittance {
         Transmittance::Exclusive => "exclusive",
         Transmittance::Inclusive => "inclusive",
@@ -54,19 +54,19 @@ pub(super) fn name(transmittance: Transmittance) -> &'static str {
 }
 
 /// What a chunk of rays came to.
-pub(super) struct Outcome {
+pub(crate) struct Outcome {
     /// Colour and opacity of each ray.
-    pub(super) rendered: Vec<[f64; 4]>,
+    pub(crate) rendered: Vec<[f64; 4]>,
     /// Samples that were composited.
-    pub(super) kept: usize,
+    pub(crate) kept: usize,
     /// Median of the repeats; `None` without timestamps.
-    pub(super) seconds: Option<f64>,
+    pub(crate) seconds: Option<f64>,
 }
 
 /// A workbench with the stages of every variant.
-pub(super) struct Device {
+pub(crate) struct Device {
     /// Rays of a whole batch.
-    pub(super) rays: usize,
+    pub(crate) rays: usize,
     bench: Workbench,
     /// Of each variant: selection, and compositing behind it.
     variants: Vec<Vec<Stage>>,
@@ -79,7 +79,7 @@ impl Device {
     ///
     /// # Errors
     /// When the adapter cannot hold the samples or refuses a kernel.
-    pub(super) fn new(gpu: &Arc<Gpu>, rays: usize, most_steps: usize, repeats: u32) -> Result<Self> {
+    pub(crate) fn new(gpu: &Arc<Gpu>, rays: usize, most_steps: usize, repeats: u32) -> Result<Self> {
         let mut setup = Setup::tiny();
         let most = if gpu.is_cpu() { SAMPLES_ON_CPU } else { SAMPLES_ON_GPU };
         let samples = most.min(rays * most_steps).max(most_steps);
@@ -92,12 +92,12 @@ impl Device {
     }
 
     /// Rays that fit at once, each of `steps` samples.
-    pub(super) fn chunk(&self, steps: usize) -> usize {
+    pub(crate) fn chunk(&self, steps: usize) -> usize {
         (self.bench.plan.config.batch.samples / steps).clamp(1, self.rays)
     }
 
     /// Whether times are measured.
-    pub(super) fn has_timer(&self) -> bool {
+    pub(crate) fn has_timer(&self) -> bool {
         self.timer.is_some()
     }
 
@@ -105,7 +105,7 @@ impl Device {
     ///
     /// # Errors
     /// When there are too many, or the device was lost.
-    pub(super) fn upload(&self, rays: &[Samples]) -> Result<()> {
+    pub(crate) fn upload(&self, rays: &[Samples]) -> Result<()> {
         let training_ray = |ray: &Samples| TrainingRay {
             direction: DVec3::Z,
             samples: vec![
@@ -131,7 +131,7 @@ impl Device {
     ///
     /// # Errors
     /// When the device was lost, or left rays out.
-    pub(super) fn render(&mut self, index: usize, rays: &[Samples]) -> Result<Outcome> {
+    pub(crate) fn render(&mut self, index: usize, rays: &[Samples]) -> Result<Outcome> {
         let (bench, stages) = (&self.bench, &self.variants[index]);
         bench.run(&stages[..SELECTING.len()])?;
         let counters = bench.counters()?;

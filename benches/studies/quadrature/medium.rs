@@ -21,18 +21,16 @@
 //!   saves the more time, the more of the ray lies behind.
 //! - *Rounding.* The kernel's f32 sums differ from the f64 ones by 3·10⁻⁸ with 4 steps to 4·10⁻⁷ with 1024.
 
-pub mod order;
-
-use crate::verify::reference::Transmittance;
-use crate::verify::reference::composite::{CompositeInput, composite};
-use crate::verify::reference::selection::{Luck, Selection, select};
+use nerf::verify::reference::Transmittance;
+use nerf::verify::reference::composite::{CompositeInput, composite};
+use nerf::verify::reference::selection::{Luck, Selection, select};
 
 /// Log-density of nothing: its optical depth is 10⁻²⁶ per unit of length.
 const EMPTY: f64 = -60.0;
 
 /// A density along a ray over `t` in `[0, 1]`, with a colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Medium {
+pub(crate) enum Medium {
     /// A Gaussian of optical depth 3: smooth, and nothing at both ends.
     Bump,
     /// A homogeneous slab of optical depth 12 with walls that no step is aligned with.
@@ -60,11 +58,10 @@ const WALL_COLOR: [f64; 3] = [0.9, 0.5, 0.2];
 
 impl Medium {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Bump, Self::Slab, Self::Wall];
+    pub(crate) const ALL: [Self; 3] = [Self::Bump, Self::Slab, Self::Wall];
 
     /// Its name in tables and files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Bump => "bump",
             Self::Slab => "slab",
@@ -73,8 +70,7 @@ impl Medium {
     }
 
     /// What it is.
-    #[must_use]
-    pub fn description(self) -> &'static str {
+    pub(crate) fn description(self) -> &'static str {
         match self {
             Self::Bump => "smooth bump, optical depth 3",
             Self::Slab => "slab with two walls, optical depth 12",
@@ -83,8 +79,7 @@ impl Medium {
     }
 
     /// Density at `t`, per unit of `t`.
-    #[must_use]
-    pub fn density(self, t: f64) -> f64 {
+    pub(crate) fn density(self, t: f64) -> f64 {
         match self {
             Self::Bump => {
                 let z = (t - BUMP_CENTER) / BUMP_DEVIATION;
@@ -98,8 +93,7 @@ impl Medium {
     }
 
     /// The largest density.
-    #[must_use]
-    pub fn densest(self) -> f64 {
+    pub(crate) fn densest(self) -> f64 {
         match self {
             Self::Bump => BUMP_DEPTH / (BUMP_DEVIATION * std::f64::consts::TAU.sqrt()),
             _ => self.layers().iter().fold(0.0, |most, layer| layer.density.max(most)),
@@ -107,8 +101,7 @@ impl Medium {
     }
 
     /// Optical depth in front of `t`: the integral of the density, by `erf` or piece by piece.
-    #[must_use]
-    pub fn depth(self, t: f64) -> f64 {
+    pub(crate) fn depth(self, t: f64) -> f64 {
         match self {
             Self::Bump => {
                 let z = (t - BUMP_CENTER) / BUMP_DEVIATION;
@@ -123,8 +116,7 @@ impl Medium {
     }
 
     /// Colour at `t`: `(T, 1 − T, 4 T (1 − T))`, or the wall's.
-    #[must_use]
-    pub fn color(self, t: f64) -> [f64; 3] {
+    pub(crate) fn color(self, t: f64) -> [f64; 3] {
         if t >= self.surface() {
             return WALL_COLOR;
         }
@@ -134,8 +126,7 @@ impl Medium {
 
     /// Rendered colour over black, and opacity: `P(1) − P(T_w) + (T_w − T_end) c_wall` and `1 − T_end`, where `P`
     /// is the antiderivative of the colour's polynomials and `T_w` the transmittance up to the wall.
-    #[must_use]
-    pub fn exact(self) -> [f64; 4] {
+    pub(crate) fn exact(self) -> [f64; 4] {
         let antiderivative = |t: f64| {
             let square = t * t;
             [0.5 * square, t - 0.5 * square, 2.0 * square - 4.0 / 3.0 * square * t]
@@ -163,20 +154,19 @@ impl Medium {
 
 /// The samples of a ray, front to back.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Samples {
+pub(crate) struct Samples {
     /// Log-densities `[steps]`.
-    pub s: Vec<f64>,
+    pub(crate) s: Vec<f64>,
     /// Step length, the same for all.
-    pub delta: f64,
+    pub(crate) delta: f64,
     /// Colours `[steps, 3]`.
-    pub color: Vec<[f64; 3]>,
+    pub(crate) color: Vec<[f64; 3]>,
 }
 
 impl Samples {
     /// Midpoints of `steps` equal steps over `[0, 1]`, moved by up to half a step as `phase` goes from 0 to 1.
     /// All media are empty where that moves the ends to.
-    #[must_use]
-    pub fn new(medium: Medium, steps: usize, phase: f64) -> Self {
+    pub(crate) fn new(medium: Medium, steps: usize, phase: f64) -> Self {
         let delta = 1.0 / steps.max(1) as f64;
         let at = |i: usize| (i as f64 + phase) * delta;
         Self {
@@ -188,8 +178,7 @@ impl Samples {
 
     /// Colour over black and opacity by [`composite`] in f64, ending where [`select`] ends a ray below the
     /// transmittance `stop`.
-    #[must_use]
-    pub fn render(&self, convention: Transmittance, stop: f64) -> [f64; 4] {
+    pub(crate) fn render(&self, convention: Transmittance, stop: f64) -> [f64; 4] {
         let delta = vec![self.delta; self.s.len()];
         let all = Selection { stop_transmittance: stop, floor: 0.0, light_share: 1.0 };
         let kept = select(&all, &self.s, &delta, |_| Luck { member: [0.0; 2], light: [0.0; 2] }).1;
@@ -206,23 +195,22 @@ impl Samples {
 }
 
 /// The phase of ray `ray` of `rays`: equally spaced in `[0, 1)`.
-#[must_use]
-pub fn phase(ray: usize, rays: usize) -> f64 {
+pub(crate) fn phase(ray: usize, rays: usize) -> f64 {
     (ray as f64 + 0.5) / rays.max(1) as f64
 }
 
 /// Root of the mean squared differences of rays: of the colour over three channels, and of the opacity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Rms {
+pub(crate) struct Rms {
     /// Of the colour.
-    pub color: f64,
+    pub(crate) color: f64,
     /// Of the opacity.
-    pub opacity: f64,
+    pub(crate) opacity: f64,
 }
 
 impl Rms {
     /// Over pairs of rendered rays `[r, g, b, α]`; zeros of none.
-    pub fn of(pairs: impl IntoIterator<Item = ([f64; 4], [f64; 4])>) -> Self {
+    pub(crate) fn of(pairs: impl IntoIterator<Item = ([f64; 4], [f64; 4])>) -> Self {
         let (mut color, mut opacity, mut rays) = (0.0, 0.0, 0.0);
         for (a, b) in pairs {
             let squares: [f64; 4] = std::array::from_fn(|x| (a[x] - b[x]).powi(2));
@@ -232,94 +220,5 @@ impl Rms {
         }
         let root = |sum: f64| (sum / f64::max(rays, 1.0)).sqrt();
         Self { color: root(color), opacity: root(opacity) }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::order::{Point, order};
-    use super::*;
-
-    const FINE: usize = 200_000;
-
-    /// The defining integrals as sums over very many steps, with none of the formulas of `exact` and `depth`.
-    #[test]
-    fn exact_values_are_the_integrals() {
-        for medium in Medium::ALL {
-            let delta = 1.0 / FINE as f64;
-            let (mut depth, mut sum) = (0.0_f64, [0.0; 4]);
-            for i in 0..FINE {
-                let t = (i as f64 + 0.5) * delta;
-                let tau = medium.density(t) * delta;
-                let through = (-depth - 0.5 * tau).exp();
-                assert!((depth + 0.5 * tau - medium.depth(t)).abs() < 1e-3, "{medium:?} at {t}");
-                let [r, g, b] = medium.color(t);
-                for (sum, c) in sum.iter_mut().zip([r, g, b, 1.0]) {
-                    *sum += through * tau * c;
-                }
-                depth += tau;
-            }
-            for (sum, exact) in sum.iter().zip(medium.exact()) {
-                assert!((sum - exact).abs() < 2e-6, "{medium:?}: {sum} {exact}");
-            }
-            assert!((depth - medium.depth(1.0)).abs() < 1e-9 * depth);
-        }
-    }
-
-    #[test]
-    fn media_are_empty_at_their_ends() {
-        for medium in Medium::ALL {
-            assert!(medium.depth(0.125) < 2e-9, "{medium:?}");
-            assert!(medium.depth(1.0) - medium.depth(0.875) < 2e-9, "{medium:?}");
-        }
-    }
-
-    fn curve(medium: Medium, convention: Transmittance, stop: f64) -> Vec<(Point, Point)> {
-        let error = |steps: usize| {
-            let rays =
-                (0..64).map(|ray| Samples::new(medium, steps, phase(ray, 64)).render(convention, stop));
-            let rms = Rms::of(rays.map(|ray| (ray, medium.exact())));
-            let point = |error| Point { steps, error, rounding: 1e-13 };
-            (point(rms.color), point(rms.opacity))
-        };
-        (2..=10).map(|power| error(1 << power)).collect()
-    }
-
-    /// Orders of colour and opacity, `None` without an asymptotic range.
-    fn orders(medium: Medium, convention: Transmittance) -> [Option<f64>; 2] {
-        let (color, opacity): (Vec<_>, Vec<_>) = curve(medium, convention, 0.0).into_iter().unzip();
-        [color, opacity].map(|points| order(&points, medium.densest()).map(|order| order.slope))
-    }
-
-    #[test]
-    fn orders_are_those_of_the_documentation() {
-        let near = |order: Option<f64>, want: f64| {
-            let found = order.expect("an asymptotic range");
-            assert!((found - want).abs() < 0.15, "{found} and not {want}");
-        };
-        let [color, opacity] = orders(Medium::Bump, Transmittance::Exclusive);
-        near(color, 2.0);
-        assert_eq!(opacity, None, "rounding is reached before the range begins");
-        let [color, opacity] = orders(Medium::Slab, Transmittance::Exclusive);
-        near(color, 1.0);
-        near(opacity, 1.0);
-        for medium in [Medium::Bump, Medium::Slab] {
-            near(orders(medium, Transmittance::Inclusive)[0], 1.0);
-        }
-        near(orders(Medium::Bump, Transmittance::Inclusive)[1], 1.0);
-    }
-
-    #[test]
-    fn a_wall_is_opaque_with_few_samples_only_in_the_exclusive_sum() {
-        let opacity_error = |convention| curve(Medium::Wall, convention, 0.0)[1].1.error;
-        assert!(opacity_error(Transmittance::Exclusive) < 1e-9);
-        assert!(opacity_error(Transmittance::Inclusive) > 0.5);
-    }
-
-    #[test]
-    fn the_early_stop_costs_its_threshold_at_most() {
-        let finest = |stop| curve(Medium::Slab, Transmittance::Exclusive, stop)[8].1.error;
-        let (without, with) = (finest(0.0), finest(1e-4));
-        assert!(with > 2e-5 && with < 1e-4 && without < with, "{without} {with}");
     }
 }

@@ -6,15 +6,16 @@
 //! ```
 //!
 //! Evaluated front to back, the sum over later samples is `R − Σ_prefix`: it cancels once most of the colour
-//! is in the prefix, and `τ_i` multiplies what rounding left. [`super::composite`] has the stable form.
+//! is in the prefix, and `τ_i` multiplies what rounding left. [`nerf::verify::reference::composite`] has the stable form.
 
-use super::Transmittance;
-use super::composite::CompositeInput;
+use nerf::verify::reference::Transmittance;
+use nerf::verify::reference::composite::CompositeInput;
 
 /// Arithmetic in which the textbook gradient is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Precision {
+pub(crate) enum Precision {
     /// As f64 gives it.
+    #[allow(dead_code, reason = "only the tests ask for it, to show that the formula is right")]
     Double,
     /// Every operation rounded to f32, as a kernel would; overflow then gives infinities and NaN.
     Single,
@@ -30,7 +31,11 @@ impl Precision {
 }
 
 /// ∂loss/∂s `[samples]` in the textbook form. Nothing is clamped: the result may be wrong or not finite.
-pub fn textbook_d_s(convention: Transmittance, precision: Precision, ray: &CompositeInput) -> Vec<f64> {
+pub(crate) fn textbook_d_s(
+    convention: Transmittance,
+    precision: Precision,
+    ray: &CompositeInput,
+) -> Vec<f64> {
     let round = |value| precision.round(value);
     let m = f64::from(ray.rays_in_batch.max(1));
     let mut d_s = vec![0.0; ray.s.len()];

@@ -1,9 +1,9 @@
 //! Errors against steps and against time, as a sheet of charts.
 
 use super::device::{Variant, name};
+use super::medium::Medium;
 use super::{Row, is_of};
 use anyhow::Result;
-use nerf::quadrature::Medium;
 use nerf::support::chart::{Axis, Chart, Mark, Series};
 use std::fmt::Write;
 
@@ -14,7 +14,7 @@ const HEIGHT: u32 = 400;
 const LEAST_ERROR: f64 = 1e-9;
 
 /// A chart for each medium and quantity: colour and opacity against the step, colour against time.
-pub(super) fn picture(rows: &[Row]) -> Result<String> {
+pub(crate) fn picture(rows: &[Row]) -> Result<String> {
     let mut charts = Vec::new();
     for medium in Medium::ALL {
         charts.push(against_step(rows, medium, "colour", |row| [row.color_error, row.color_error_f64]));

@@ -1,27 +1,41 @@
-//! `nerf bench equations`: the printed equations next to those in use, as tables.
+//! The printed equations next to those in use, as tables.
 
-mod stiff;
+pub(crate) mod stiff;
+pub(crate) mod textbook;
 
-use super::{circumstances, joined, markdown, write_json, write_text};
-use crate::cli::bench::Equations;
-use crate::commands::{Session, writable_folder};
+use super::Outcome;
 use anyhow::Result;
+use clap::Args;
 use nerf::gpu::Gpu;
+use nerf::support::file::writable_folder;
+use nerf::support::results::{circumstances, joined, markdown, write_json, write_text};
 use nerf::verify::check::fused::Fused;
 use nerf::verify::check::{Forced, Subject};
 use nerf::verify::reference::Transmittance;
 use nerf::verify::reference::composite::{CompositeInput, CompositeOutput, composite};
-use nerf::verify::reference::textbook::{Precision, textbook_d_s};
 use nerf::verify::reference::vectors::{GoldenFile, GoldenRay, RayError};
 use serde::Serialize;
 use serde_json::json;
+use std::path::PathBuf;
 use std::sync::Arc;
+use textbook::{Precision, textbook_d_s};
 
 const CONVENTIONS: [Transmittance; 2] = [Transmittance::Exclusive, Transmittance::Inclusive];
 /// Optical depths of the slabs.
 const DEPTHS: [f64; 3] = [1.0, 5.0, 50.0];
 /// Powers of two: 1 to 1024 samples.
 const POWERS: std::ops::RangeInclusive<u32> = 0..=10;
+
+/// `equations`
+#[derive(Args, Debug)]
+pub(crate) struct Equations {
+    /// Folder to write equations.json and equations.md to
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// File of golden rays; may be repeated [default: rays computed in 64 bits]
+    #[arg(long, value_name = "FILE")]
+    vectors: Vec<PathBuf>,
+}
 
 /// Opacity of a homogeneous slab.
 #[derive(Debug, Serialize)]
@@ -61,7 +75,8 @@ struct Worst {
     not_finite: usize,
 }
 
-pub(super) fn run(args: &Equations, session: &Session<'_>) -> Result<()> {
+/// The files of golden rays are read before anything is measured.
+pub(crate) fn run(args: &Equations, gpu: &Arc<Gpu>) -> Result<Outcome> {
     let files = match args.vectors.as_slice() {
         [] => CONVENTIONS.map(stiff::golden).to_vec(),
         paths => paths.iter().map(|path| GoldenFile::load(path)).collect::<Result<_>>()?,
@@ -69,19 +84,18 @@ pub(super) fn run(args: &Equations, session: &Session<'_>) -> Result<()> {
     if let Some(folder) = &args.out {
         writable_folder(folder)?;
     }
-    let gpu = session.open_gpu()?;
-    let slabs = slabs(&gpu)?;
+    let slabs = slabs(gpu)?;
     let mut gradients = Vec::new();
     for file in &files {
-        gradients.extend(compare(&gpu, file)?);
+        gradients.extend(compare(gpu, file)?);
     }
     let text = describe(&slabs, &gradients);
-    let result = joined(circumstances(&gpu), json!({ "slabs": slabs, "gradients": gradients }));
+    let result = joined(circumstances(gpu), json!({ "slabs": slabs, "gradients": gradients }));
     if let Some(folder) = &args.out {
         write_json(&folder.join("equations.json"), &result)?;
         write_text(&folder.join("equations.md"), &(text.clone() + "\n"))?;
     }
-    session.print(&result, &text)
+    Ok(Outcome { json: result, text })
 }
 
 fn slabs(gpu: &Arc<Gpu>) -> Result<Vec<Slab>> {
