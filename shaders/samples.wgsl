@@ -1,9 +1,9 @@
-// Writes the marked steps of each ray as samples: position in box space and length of the step.
-// needs: counters, extent, group, march_start, ray_load, stepping
+// Writes the marked steps of each ray as samples: where the hash grid has them, and the length of the step.
+// needs: counters, distance, extent, group, march_start, ray_load, space
 
 var<storage, read> ray_steps: array<u32>;
 var<storage, read> ray_spans: array<vec2<u32>>;
-// Position, and the step's length in units of the inner cube's side.
+// Position in the hash grid, and the step's length in units of the inner cube's side.
 tensor<write> samples: vec4<f32>;
 
 @compute @workgroup_size(GROUP_SIZE)
@@ -25,9 +25,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         while word != 0u && written < span.y {
             let u = first + f32(word_index * 32u + countTrailingZeros(word));
             word &= word - 1u;
-            let t = stepping_distance(u);
-            let delta = stepping_length(u) * DENSITY_SCALE;
-            samples_store(span.x + written, vec4(ray.origin + t * ray.direction, delta));
+            let t = space_step_distance(u);
+            let delta = space_step_length(u) * DENSITY_SCALE;
+            samples_store(span.x + written, vec4(space_in_grid(ray_at(ray, t)), delta));
+            distance_store(span.x + written, ray, t);
             written++;
         }
         word_index++;

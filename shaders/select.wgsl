@@ -5,7 +5,7 @@
 // group that stays lighter than LIGHT_SHARE of the floor is kept by chance; what that adds to the ray's weight or takes
 // from it is made up for by the estimate's next kept sample. Opacity and transmittance are those of all samples.
 // Nothing is kept behind the point where the ray is opaque; see `reference::selection`.
-// needs: counters, density, exp, group, occupancy, occupancy_raise, random, step
+// needs: counters, density, exp, group, occupancy_raise, random, space, step
 
 tensor<read> samples: vec4<f32>;
 tensor<read> density_out: vec4<f32>;
@@ -108,7 +108,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let tau = optical_depth(log_density, sample.w);
         let member = Member(i, transmittance * opacity(tau), depth, tau);
         // Where rays go, the occupancy grid costs no samples of its own.
-        occupancy_raise(cell_around(sample.xyz, cascade_at(sample.xyz)), log_density);
+        occupancy_raise(space_cell(sample.xyz), log_density);
         if member.weight >= WEIGHT_FLOOR {
             walk = close(walk);
             walk = keep(walk, member, 1.0 + walk.carry / max(member.weight, 1e-30));

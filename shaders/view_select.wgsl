@@ -1,29 +1,23 @@
 // Adds the samples of a round to the optical depth, opacity and depth of a view's rays, and decides which of them get
 // colour: wherever the weights since the last one sum to COLOR_WEIGHT. That sample's colour stands for theirs. A ray
 // ends where it is opaque or leaves the box.
-// needs: camera, counters, density, exp, group, lens, transmittance, view_ray
+// needs: counters, density, distance, exp, group, transmittance
 
-var<uniform> view_camera: Camera;
 tensor<read> samples: vec4<f32>;
 tensor<read> density_out: vec4<f32>;
 var<storage, read> ray_spans: array<vec2<u32>>;
-var<storage, read> view_rays: array<ViewRay>;
 // As `view_rays` begins them.
 tensor<read_write> ray_states: vec4<f32>;
 var<storage, read_write> kept_spans: array<vec2<u32>>;
 // The samples with colour of ray r from index ray_spans[r].x on: sample (as a number), and the weight it stands for.
 tensor<write> chosen: vec4<f32>;
-// 1 where the slot's ray ended.
+// 1 where the slot's ray ended, which marching tells of those that leave the box.
 var<storage, read_write> view_slots: array<vec2<u32>>;
 
 @compute @workgroup_size(GROUP_SIZE)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
     if index >= counters.rays_used {
-        return;
-    }
-    if view_rays[index].pixel == NO_PIXEL {
-        kept_spans[index] = vec2(0u);
         return;
     }
     let span = ray_spans[index];
@@ -33,7 +27,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var pending = state.z;
     var distance = state.w;
     var count = 0u;
-    var ended = view_rays[index].next_step >= MAX_STEPS;
+    var ended = view_slots[index].y == 1u;
     var i = span.x;
     while i < span.x + span.y {
         let sample = samples_load(i);
@@ -41,7 +35,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let weight = exp_accurate(-transmittance_depth(depth, tau)) * opacity(tau);
         alpha += weight;
         pending += weight;
-        distance += weight * lens_depth(view_camera, sample.xyz - view_camera.origin);
+        distance += weight * sample_distance(i);
         if pending >= COLOR_WEIGHT {
             chosen_store(span.x + count, vec4(f32(i), pending, 0.0, 0.0));
             count++;

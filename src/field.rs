@@ -1,10 +1,12 @@
 //! The radiance field on a device: its parameters and kernels, training it and rendering it.
 
+mod capacity;
 pub mod checkpoint;
 mod constants;
 mod demands;
 mod features;
 pub mod layer;
+pub mod layout;
 pub mod lenses;
 pub mod link;
 pub mod parameters;
@@ -13,6 +15,7 @@ pub mod records;
 pub mod render;
 mod shared;
 pub mod silhouette;
+mod space;
 pub mod stages;
 pub mod train;
 mod variants;
@@ -20,10 +23,124 @@ pub mod views;
 pub mod visibility;
 mod workspace;
 
+pub use capacity::Capacity;
 pub use constants::{RELATIVE_FLOOR, STEP_GROWTH, STEP_SHRINKAGE, dimension};
 pub use features::Needs;
 pub use link::Link;
 pub use plan::{Plan, Traits, dispatch};
 pub use shared::{Camera, Counters, LAYOUTS, Progress, RayResult, RayTarget, Step};
-pub use stages::{color, density, march, occupancy, training, viewing};
+pub use space::Space;
+pub use stages::{backward, color, composite, density, march, occupancy, optimize, rays, viewing};
 pub use workspace::Workspace;
+
+use crate::gpu::Gpu;
+use crate::gpu::buffer::Buffer;
+use anyhow::{Result, ensure};
+use checkpoint::{About, Checkpoint};
+use parameters::Numbers;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A radiance field on a device: how its kernels are linked, where it is, and the arrays that it consists of.
+#[derive(Clone, Debug)]
+pub struct Field {
+    gpu: Arc<Gpu>,
+    plan: Plan,
+    arrays: Workspace,
+    /// Whether arrays that only training reads are there too.
+    is_whole: bool,
+    step_excess: StepExcess,
+}
+
+/// By how much the steps along rays that a field was trained with are longer than the configuration's, as a share of them.
+#[derive(Clone, Debug)]
+enum StepExcess {
+    /// This.
+    Known(f32),
+    /// What the counters of a training say.
+    Counted(Buffer),
+}
+
+impl Field {
+    /// A field that no step was taken of, with everything that training needs.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold it.
+    pub fn new(gpu: &Arc<Gpu>, plan: Plan) -> Result<Self> {
+        let field = Self::allocate(gpu, plan, true)?;
+        let nothing_hidden = vec![false; field.plan.cell_count()];
+        field.reset(&nothing_hidden)?;
+        Ok(field)
+    }
+
+    /// What rendering needs of a checkpoint.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold it.
+    pub fn of(gpu: &Arc<Gpu>, checkpoint: &Checkpoint) -> Result<Self> {
+        let mut field = Self::allocate(gpu, checkpoint.about.plan(Traits::of(gpu)), false)?;
+        field.arrays.set_arrays(gpu, &field.plan, &checkpoint.state.arrays)?;
+        field.step_excess = StepExcess::Known(checkpoint.state.step_excess);
+        Ok(field)
+    }
+
+    /// What rendering needs of the checkpoint in a file, and what that says about itself.
+    ///
+    /// # Errors
+    /// When the file cannot be used, or the adapter cannot hold the field.
+    pub fn load(gpu: &Arc<Gpu>, path: &Path) -> Result<(Self, About)> {
+        let checkpoint = Checkpoint::load(path)?;
+        Ok((Self::of(gpu, &checkpoint)?, checkpoint.about))
+    }
+
+    fn allocate(gpu: &Arc<Gpu>, plan: Plan, is_whole: bool) -> Result<Self> {
+        let mut arrays = Workspace::default();
+        arrays.allocate(gpu, &plan.field_demands(is_whole))?;
+        arrays.write(gpu, "levels", &plan.layout.levels);
+        Ok(Self { gpu: Arc::clone(gpu), plan, arrays, is_whole, step_excess: StepExcess::Known(0.0) })
+    }
+
+    /// The same field, of whose views as much is in work at once as `rounds` say.
+    #[must_use]
+    pub fn with_rounds(&self, rounds: viewing::Rounds) -> Self {
+        Self { plan: Plan { rounds, ..self.plan.clone() }, ..self.clone() }
+    }
+
+    /// How its kernels are linked.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn gpu(&self) -> &Arc<Gpu> {
+        &self.gpu
+    }
+
+    /// Back to where a training begins for which nothing can be in the `hidden` cells of the occupancy grid.
+    fn reset(&self, hidden: &[bool]) -> Result<()> {
+        let start = self.plan.arrays().map(|array| (array.name, array.start(&self.plan, hidden)));
+        self.set_arrays(&start.collect::<Vec<_>>())
+    }
+
+    /// The numbers of its arrays.
+    ///
+    /// # Errors
+    /// When it has only those that rendering reads, or the device was lost.
+    pub fn arrays(&self) -> Result<Vec<(&'static str, Numbers)>> {
+        ensure!(
+            self.is_whole,
+            "this field was loaded to be rendered, without what training keeps of it; load it for training"
+        );
+        self.arrays.arrays(&self.gpu, &self.plan)
+    }
+
+    /// Sets the numbers of its arrays.
+    ///
+    /// # Errors
+    /// When an array is missing or of another size.
+    pub fn set_arrays(&self, arrays: &[(&'static str, Numbers)]) -> Result<()> {
+        self.arrays.set_arrays(&self.gpu, &self.plan, arrays)
+    }
+}

@@ -31,7 +31,7 @@
 //!
 //! ```no_run
 //! use nerf::{camera::LensKind, capture::dataset::Dataset, config::Config, gpu};
-//! use nerf::field::{Needs, Plan, parameters, train, views::Views};
+//! use nerf::field::{Field, Needs, Plan, Space, layout, train, views::Views};
 //! use std::{path::Path, sync::Arc};
 //!
 //! # fn main() -> anyhow::Result<()> {
@@ -40,23 +40,21 @@
 //! dataset.stream(&dataset.train, false, &mut |_, photo| Ok(images.push(photo.image)))?;
 //! let cameras: Vec<_> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
 //! let gpu = Arc::new(gpu::Gpu::open(&gpu::adapter::choose(None)?)?);
-//! let config = Config::default();
-//! let finest = parameters::finest_resolution(&config.grid, &dataset.bounds, &cameras);
-//! let layout = parameters::Layout::new(&config, finest);
+//! let mut config = Config::default();
+//! let space = Space::from(&dataset.bounds);
+//! config.grid.finest = layout::finest_resolution(&config.grid, &space, &cameras);
 //! let needs = Needs {
 //!     lenses: LensKind::among(&cameras),
 //!     alpha: images.iter().any(|image| image.has_alpha),
 //!     hdr: dataset.is_hdr,
-//!     cascades: dataset.bounds.cascades,
-//!     cameras: cameras.len(),
 //!     ..Needs::default()
 //! };
-//! let plan = Plan::new(&gpu, config, layout, needs);
-//! let mut views = Views::new(&gpu, &plan, &cameras, &dataset.bounds)?;
+//! let plan = Plan::new(&gpu, config, needs, space);
+//! let mut views = Views::new(&gpu, &plan, &cameras)?;
 //! for image in images {
 //!     views.add(&image.into())?;
 //! }
-//! let mut trainer = train::Trainer::new(&gpu, plan, views)?;
+//! let mut trainer = train::Trainer::new(Field::new(&gpu, plan)?, views)?;
 //! for _ in 0..1000 {
 //!     trainer.step(1e-2, None)?;
 //! }

@@ -4,7 +4,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use nerf::camera::Bounds;
 use nerf::camera::{Camera, Lens, LensKind};
 use nerf::config::{Accumulation, Batch, ColorLoss, Config, Grid, March, Network, Occupancy};
-use nerf::field::parameters::Layout;
+use nerf::field::layout::Layout;
 use nerf::field::render::{Renderer, View};
 use nerf::field::train::{State, StepStats, Trainer};
 use nerf::field::training::STATE;

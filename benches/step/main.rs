@@ -18,10 +18,10 @@ use clap::{Parser, ValueEnum};
 use nerf::camera::{Camera, LensKind};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::config::Config;
-use nerf::field::parameters::{Layout, finest_resolution};
+use nerf::field::layout::finest_resolution;
 use nerf::field::train::{StepStats, Trainer};
 use nerf::field::views::Views;
-use nerf::field::{Needs, Plan};
+use nerf::field::{Field, Needs, Plan, Space};
 use nerf::gpu::timer::Timer;
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::Image;
@@ -320,22 +320,20 @@ impl Throughput {
     }
 }
 
-fn trainer(gpu: &Arc<Gpu>, config: Config, dataset: &Dataset, images: &[Image]) -> Result<Trainer> {
+fn trainer(gpu: &Arc<Gpu>, mut config: Config, dataset: &Dataset, images: &[Image]) -> Result<Trainer> {
     let cameras: Vec<Camera> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
-    let finest = finest_resolution(&config.grid, &dataset.bounds, &cameras);
-    let layout = Layout::new(&config, finest);
+    let space = Space::from(&dataset.bounds);
+    config.grid.finest = finest_resolution(&config.grid, &space, &cameras);
     let needs = Needs {
         lenses: LensKind::among(&cameras),
         alpha: images.iter().any(|image| image.has_alpha),
         hdr: dataset.is_hdr,
-        cascades: dataset.bounds.cascades,
-        cameras: cameras.len(),
         ..Needs::default()
     };
-    let plan = Plan::new(gpu, config, layout, needs);
-    let mut views = Views::new(gpu, &plan, &cameras, &dataset.bounds)?;
+    let plan = Plan::new(gpu, config, needs, space);
+    let mut views = Views::new(gpu, &plan, &cameras)?;
     images.iter().try_for_each(|image| views.add(&image.clone().into()))?;
-    Trainer::new(gpu, plan, views)
+    Trainer::new(Field::new(gpu, plan)?, views)
 }
 
 /// User and system time of this process, all threads together. Linux counts it in hundredths of a second.

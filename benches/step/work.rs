@@ -5,7 +5,7 @@
 
 use nerf::config::Accumulation;
 use nerf::field::Plan;
-use nerf::field::parameters::{COLOR_INPUTS, DENSITY_OUTPUTS, Layer};
+use nerf::field::layout::{COLOR_INPUTS, DENSITY_OUTPUTS, Layer};
 use serde::Serialize;
 use serde_json::Value;
 

@@ -12,5 +12,5 @@ fn adam_update(old: Adam, gradient: vec4<f32>) -> Adam {
     let second = BETA_2 * old.second + (1.0 - BETA_2) * gradient * gradient;
     let mean = first * step.first_correction;
     let deviation = sqrt(second * step.second_correction);
-    return Adam(old.parameter - step.learning_rate * mean / (deviation + EPSILON), first, second);
+    return Adam(old.parameter - step.learning_rate * RATE * mean / (deviation + EPSILON), first, second);
 }

@@ -1,5 +1,5 @@
 // Provides: camera_ray, and depth along the view axis and along a ray.
-// needs: lens, ray
+// needs: lens, ray, space
 
 struct Camera {
     // Position and axes in box space; `back` points away from the view.
@@ -47,7 +47,7 @@ fn camera_ray(camera: Camera, pixel: vec2<f32>) -> Ray {
     let seen = lens_ray(camera, camera_quotient(pixel - camera.center_px, camera.focal_px));
     let origin = camera.origin + camera.right * seen.start.x + camera.up * seen.start.y;
     let axes = mat3x3(camera.right, camera.up, camera.back);
-    var ray = ray_through_box(origin, normalize(axes * seen.direction));
+    var ray = space_ray(origin, normalize(axes * seen.direction));
     if !seen.exists {
         ray.t_far = -1.0;
     }

@@ -21,3 +21,7 @@ fn ray_through_box(origin: vec3<f32>, direction: vec3<f32>) -> Ray {
     let t_far = min(farther.x, min(farther.y, farther.z));
     return Ray(origin, t_near, direction, t_far);
 }
+
+fn ray_at(ray: Ray, t: f32) -> vec3<f32> {
+    return ray.origin + t * ray.direction;
+}

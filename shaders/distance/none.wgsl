@@ -1,5 +1,9 @@
-// Provides: sample_distance, which the loss has no use for.
+// Provides: distance_store and sample_distance where nothing asks for distances along rays.
+// needs: ray
 
-fn sample_distance(ray: u32, position: vec3<f32>) -> f32 {
+fn distance_store(sample: u32, ray: Ray, t: f32) {
+}
+
+fn sample_distance(sample: u32) -> f32 {
     return 0.0;
 }

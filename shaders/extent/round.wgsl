@@ -4,6 +4,8 @@
 
 var<uniform> progress: Progress;
 var<storage, read_write> view_rays: array<ViewRay>;
+// 1 in the second where a slot's ray has left the box, or the slot has none.
+var<storage, read_write> view_slots: array<vec2<u32>>;
 
 // The first step to march, and the first of those that were marched.
 fn extent_begin(index: u32) -> u32 {
@@ -23,4 +25,5 @@ fn extent_most() -> u32 {
 fn extent_end(index: u32, next: u32) {
     view_rays[index].first_step = view_rays[index].next_step;
     view_rays[index].next_step = next;
+    view_slots[index] = vec2(0u, u32(next >= MAX_STEPS));
 }

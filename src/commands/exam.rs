@@ -5,12 +5,10 @@ use super::train::setup::Setup;
 use crate::remarks::Remarks;
 use anyhow::Result;
 use nerf::capture::dataset::{Dataset, evenly_spaced};
-use nerf::field::Workspace;
+use nerf::field::Field;
 use nerf::field::render::Renderer;
-use nerf::gpu::Gpu;
 use nerf::photo::Photo;
 use nerf::photo::color::ColorSpace;
-use std::sync::Arc;
 
 /// Renders test views of a field in training and compares them, on black.
 #[derive(Debug)]
@@ -33,11 +31,10 @@ pub(super) struct Marks {
 }
 
 impl<'a> Exam<'a> {
-    /// A renderer of the field in `workspace`, and the photos of up to `few` views. `None` without test views.
+    /// A renderer of the field, and the photos of up to `few` views. `None` without test views.
     pub(super) fn new(
-        gpu: &Arc<Gpu>,
         setup: &Setup,
-        workspace: &Workspace,
+        field: &Field,
         dataset: &'a Dataset,
         few: usize,
     ) -> Result<Option<Self>> {
@@ -45,7 +42,7 @@ impl<'a> Exam<'a> {
             return Ok(None);
         }
         let needs = &setup.about.needs;
-        let renderer = Renderer::new(gpu, &setup.plan, workspace, &setup.about.bounds, &needs.lenses)?;
+        let renderer = Renderer::new(field, &needs.lenses)?;
         let color_space = ColorSpace::of(needs.hdr);
         let judge = Judge::new(renderer, color_space, dataset);
         let few = evenly_spaced(&setup.test, few);

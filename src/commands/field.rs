@@ -3,9 +3,9 @@
 use super::Session;
 use anyhow::Result;
 use nerf::camera::LensKind;
+use nerf::field;
 use nerf::field::checkpoint::{self, About, Checkpoint};
-use nerf::field::render::{PARAMETERS, Renderer};
-use nerf::field::{Plan, Workspace, density, training};
+use nerf::field::render::Renderer;
 use nerf::gpu::Gpu;
 use nerf::photo::color::ColorSpace;
 use std::collections::BTreeSet;
@@ -19,15 +19,15 @@ pub(super) struct Field {
     pub(super) path: PathBuf,
     /// What it is.
     pub(super) about: About,
-    parameters: Vec<(&'static str, Vec<f32>)>,
-    occupancy_bits: Vec<u32>,
+    checkpoint: Checkpoint,
 }
 
 impl Field {
     /// Reads the checkpoint that `run` stands for; of its state, what rendering needs is kept.
     pub(super) fn load(run: &Path, session: &Session<'_>) -> Result<Self> {
         let path = checkpoint::locate(run)?;
-        let Checkpoint { about, state } = Checkpoint::load(&path)?;
+        let checkpoint = Checkpoint::load(&path)?;
+        let about = checkpoint.about.clone();
         session.remarks.detail(&format!(
             "{}: {} steps in {:.1} s on {}, trained on {}",
             path.display(),
@@ -36,9 +36,7 @@ impl Field {
             about.adapter,
             about.dataset
         ));
-        let named = training::STATE.into_iter().zip(state.buffers);
-        let parameters = named.filter(|(name, _)| PARAMETERS.contains(name)).collect();
-        Ok(Self { path, about, parameters, occupancy_bits: state.occupancy_bits })
+        Ok(Self { path, about, checkpoint })
     }
 
     /// The colour space of what it renders.
@@ -48,16 +46,6 @@ impl Field {
 
     /// A renderer of the field for cameras with `lenses`.
     pub(super) fn renderer(&self, gpu: &Arc<Gpu>, lenses: &BTreeSet<LensKind>) -> Result<Renderer> {
-        let About { config, needs, bounds, .. } = &self.about;
-        let plan = Plan::new(gpu, config.clone(), self.about.layout(), needs.clone());
-        let mut workspace = Workspace::default();
-        density::allocate_parameters(gpu, &plan, &mut workspace)?;
-        for (name, values) in &self.parameters {
-            workspace.write(gpu, name, values);
-        }
-        workspace.write(gpu, "occupancy_bits", &self.occupancy_bits);
-        let mut renderer = Renderer::new(gpu, &plan, &workspace, bounds, lenses)?;
-        renderer.step_excess = self.about.step_excess;
-        Ok(renderer)
+        Renderer::new(&field::Field::of(gpu, &self.checkpoint)?, lenses)
     }
 }

@@ -20,6 +20,7 @@ use folder::RunFolder;
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::health::{Severity, Survey};
 use nerf::config::schedule::Budget;
+use nerf::field::Field;
 use nerf::field::checkpoint::About;
 use nerf::field::train::Trainer;
 use nerf::run::report::views::TestViews;
@@ -63,7 +64,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let views = photos::load(&setup, &dataset, &gpu, session.remarks)?;
     let load_seconds = clock.elapsed().as_secs_f64();
     let clock = Instant::now();
-    let mut trainer = Trainer::new(&gpu, setup.plan.clone(), views)?;
+    let mut trainer = Trainer::new(Field::new(&gpu, setup.plan.clone())?, views)?;
     trainer.warm_up()?;
     if let Some(state) = &setup.state {
         trainer.restore(state)?;
@@ -71,7 +72,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let mut exam = None;
     if !args.no_eval || args.eval_every.is_some() {
         let few = if args.eval_every.is_some() { FEW_VIEWS } else { 0 };
-        exam = Exam::new(&gpu, &setup, trainer.workspace(), &dataset, few)?;
+        exam = Exam::new(&setup, trainer.field(), &dataset, few)?;
     }
     let compile_seconds = clock.elapsed().as_secs_f64();
     let mut log = folder.begin(&setup)?;

@@ -8,10 +8,9 @@ use crate::camera::Bounds;
 use crate::camera::orbit::Orbit;
 use crate::config::Config;
 use crate::config::schedule::Budget;
-use crate::field::Needs;
-use crate::field::parameters::{FEATURES, Layout};
+use crate::field::parameters::{Array, Numbers};
 use crate::field::train::State;
-use crate::field::training::STATE;
+use crate::field::{Needs, Plan, Space, Traits};
 use crate::photo::{Reading, Split};
 use crate::support::file::write_atomically;
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -28,8 +27,6 @@ pub const FORMAT: u64 = 2;
 pub const KEY: &str = "nerf";
 /// The file's name in the folder of a training.
 pub const FILE: &str = "checkpoint.safetensors";
-
-const BITS: &str = "occupancy_bits";
 
 /// A trained field and where its training stands.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,22 +105,16 @@ const RETIRED: [(&str, &str); 3] =
     [("selection", "keep_probability"), ("occupancy", "warm_up"), ("occupancy", "stride")];
 
 impl About {
-    /// The layout of the parameters.
+    /// How kernels are linked for an adapter.
     #[must_use]
-    pub fn layout(&self) -> Layout {
-        Layout::new(&self.config, self.config.grid.finest)
+    pub fn plan(&self, adapter: Traits) -> Plan {
+        Plan::suited_to(adapter, self.config.clone(), self.needs.clone(), Space::from(&self.bounds))
     }
 
-    /// The shape of a tensor of the state.
-    fn shape(&self, layout: &Layout, name: &str) -> Vec<usize> {
-        let cells = self.config.occupancy.cells as usize;
-        match name {
-            "occupancy" => vec![self.needs.cascades as usize, cells, cells, cells],
-            BITS => vec![self.needs.cascades as usize * cells.pow(3) / 32],
-            "table" => vec![layout.entries, FEATURES],
-            "table_moments" => vec![layout.entries, 2 * FEATURES],
-            _ => vec![layout.quads, 4],
-        }
+    /// The arrays of the state, which are the same on every adapter.
+    fn arrays(&self) -> impl Iterator<Item = Array> {
+        let arrays: Vec<_> = self.plan(Traits::GPU).arrays().collect();
+        arrays.into_iter()
     }
 
     fn parse(text: &str) -> Result<Self> {
@@ -146,7 +137,7 @@ impl About {
         let about: Self = serde_json::from_value(value).context("its description is not understood")?;
         about.config.validate().context("its configuration")?;
         ensure!(about.config.grid.finest > 0, "its configuration leaves grid.finest open");
-        let Needs { cascades, .. } = about.needs;
+        let cascades = about.bounds.cascades;
         ensure!((1..=8).contains(&cascades), "expected 1 to 8 cascades, found {cascades}");
         ensure!(about.bounds.half.is_finite() && about.bounds.half > 0.0, "its scene box is empty");
         Ok(about)
@@ -159,19 +150,21 @@ impl Checkpoint {
     /// # Errors
     /// When a number is not finite, or the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
-        let layout = self.about.layout();
         let mut tensors = Vec::new();
-        for (name, values) in STATE.iter().zip(&self.state.buffers) {
-            let shape = self.about.shape(&layout, name);
-            let count: usize = shape.iter().product();
-            let values = values.get(..count).with_context(|| {
-                format!("the tensor '{name}' has {} numbers, and {count} are expected", values.len())
-            })?;
-            check_finite(name, values)?;
-            tensors.push((*name, TensorView::new(Dtype::F32, shape, bytemuck::cast_slice(values))?));
+        for (array, (name, numbers)) in self.about.arrays().zip(&self.state.arrays) {
+            let (found, expected) = (numbers.count(), array.count());
+            ensure!(
+                *name == array.name && found == expected,
+                "the tensor '{name}' has {found} numbers, and {expected} of '{}' are expected",
+                array.name
+            );
+            check_finite(name, numbers.floats())?;
+            let (dtype, bytes) = match numbers {
+                Numbers::Floats(numbers) => (Dtype::F32, bytemuck::cast_slice(numbers)),
+                Numbers::Words(numbers) => (Dtype::U32, bytemuck::cast_slice(numbers)),
+            };
+            tensors.push((*name, TensorView::new(dtype, array.shape, bytes)?));
         }
-        let bits = bytemuck::cast_slice(&self.state.occupancy_bits);
-        tensors.push((BITS, TensorView::new(Dtype::U32, self.about.shape(&layout, BITS), bits)?));
         let about = serde_json::to_string(&self.about)?;
         let metadata = HashMap::from([(KEY.to_owned(), about)]);
         let bytes = safetensors::serialize(tensors, Some(metadata))?;
@@ -194,32 +187,25 @@ impl Checkpoint {
         let about = about.context("it is a safetensors file, but `nerf train` did not write it")?;
         let about = About::parse(about)?;
         let tensors = SafeTensors::deserialize(bytes)?;
-        let layout = about.layout();
-        let data = |name: &str, dtype: Dtype| {
-            let expected = about.shape(&layout, name);
+        let numbers = |array: Array| {
+            let Array { name, shape, .. } = &array;
+            let dtype = if array.has_words() { Dtype::U32 } else { Dtype::F32 };
             let tensor = tensors.tensor(name).map_err(|_| anyhow!("the tensor '{name}' is missing"))?;
             ensure!(
-                tensor.dtype() == dtype && tensor.shape() == expected,
-                "the tensor '{name}' should be {dtype:?} {expected:?}, found {:?} {:?}",
+                tensor.dtype() == dtype && tensor.shape() == shape,
+                "the tensor '{name}' should be {dtype:?} {shape:?}, found {:?} {:?}",
                 tensor.dtype(),
                 tensor.shape()
             );
-            Ok(tensor.data())
+            let numbers = match dtype {
+                Dtype::U32 => Numbers::Words(bytemuck::pod_collect_to_vec(tensor.data())),
+                _ => Numbers::Floats(bytemuck::pod_collect_to_vec(tensor.data())),
+            };
+            check_finite(name, numbers.floats())?;
+            Ok((array.name, numbers))
         };
-        let buffer = |name: &&str| {
-            let values: Vec<f32> = bytemuck::pod_collect_to_vec(data(name, Dtype::F32)?);
-            check_finite(name, &values)?;
-            Ok(values)
-        };
-        let buffers = STATE.iter().map(buffer).collect::<Result<_>>()?;
-        let occupancy_bits = bytemuck::pod_collect_to_vec(data(BITS, Dtype::U32)?);
-        let state = State {
-            step: about.step,
-            rays: about.rays,
-            step_excess: about.step_excess,
-            buffers,
-            occupancy_bits,
-        };
+        let arrays = about.arrays().map(numbers).collect::<Result<_>>()?;
+        let state = State { step: about.step, rays: about.rays, step_excess: about.step_excess, arrays };
         Ok(Self { about, state })
     }
 }
@@ -284,7 +270,7 @@ mod tests {
         let small = r#"{"grid": {"levels": 8, "finest": 40, "log2_table": 8}, "occupancy": {"cells": 16}}"#;
         config.merge(&serde_json::from_str(small).expect("JSON")).expect("valid");
         let bounds = Bounds { center: DVec3::new(0.1, 0.2, 0.3), half: 1.5, cascades: 1, source: "x".into() };
-        let needs = Needs { alpha: true, cameras: 3, ..Needs::default() };
+        let needs = Needs { alpha: true, ..Needs::default() };
         let about = About {
             format: FORMAT,
             dataset: "data/toys".into(),
@@ -303,14 +289,13 @@ mod tests {
             has_alpha: true,
             orbit: Orbit::of(&[], DVec3::ZERO),
         };
-        let layout = about.layout();
-        let values = |name: &&str| {
-            let count: usize = about.shape(&layout, name).iter().product();
-            (0..count).map(|i| i as f32 * 0.25 - 3.0).collect()
+        let numbers = |array: Array| {
+            let floats = (0..array.count()).map(|i| i as f32 * 0.25 - 3.0).collect();
+            let words = array.has_words().then(|| Numbers::Words(vec![0xdead_beef; array.count()]));
+            (array.name, words.unwrap_or(Numbers::Floats(floats)))
         };
-        let buffers = STATE.iter().map(values).collect();
         let state =
-            State { step: 12, rays: 345, step_excess: 0.25, buffers, occupancy_bits: vec![0xdead_beef; 128] };
+            State { step: 12, rays: 345, step_excess: 0.25, arrays: about.arrays().map(numbers).collect() };
         Checkpoint { about, state }
     }
 
@@ -380,8 +365,7 @@ mod tests {
     fn what_is_not_finite_is_neither_saved_nor_loaded() {
         let (_folder, path) = saved();
         let mut diverged = checkpoint();
-        let weights = STATE.iter().position(|&name| name == "mlp").expect("the networks");
-        diverged.state.buffers[weights][7] = f32::NAN;
+        diverged.state.floats_mut("mlp")[7] = f32::NAN;
         let error = format!("{:#}", diverged.save(&path).expect_err("diverged"));
         assert!(error.contains("'mlp'") && error.contains("NaN at 7"), "{error}");
         let mut bytes = std::fs::read(&path).expect("readable");

@@ -1,8 +1,9 @@
 //! The numbers that kernels know at compile time.
 
+use super::parameters::GROUPS;
 use super::{Plan, dispatch};
 use crate::config::Transmittance;
-use crate::field::parameters::DENSITY_OUTPUTS;
+use crate::field::layout::DENSITY_OUTPUTS;
 use crate::gpu::pass::GROUP_COLUMNS;
 use crate::gpu::source::Source;
 use std::fmt::Display;
@@ -45,7 +46,7 @@ impl Plan {
     }
 
     fn dimensions(&self, source: Source) -> Source {
-        let Self { config, layout, needs, .. } = self;
+        let Self { config, layout, space, .. } = self;
         let counts = [
             ("RECORD_WORDS", self.record().words()),
             ("POSITION_WORD", self.record().position()),
@@ -60,8 +61,7 @@ impl Plan {
             ("SAMPLES_PER_THREAD", self.product.rows),
             ("CELLS", config.occupancy.cells as usize),
             ("CELL_COUNT", self.cell_count()),
-            ("CASCADES", needs.cascades as usize),
-            ("CAMERA_COUNT", needs.cameras.max(1)),
+            ("CASCADES", space.cascades()),
             ("MAX_STEPS", config.march.most_steps),
             ("STEP_WORDS", self.step_words()),
             ("TARGET_KEPT", config.batch.kept),
@@ -88,17 +88,18 @@ impl Plan {
     }
 
     fn numbers(&self, source: Source) -> Source {
-        let config = &self.config;
+        let Self { config, space, .. } = self;
+        let [least, most] = self.step_range();
         let floats = [
-            ("STEP_MIN", self.step_min()),
-            ("STEP_MAX", 1.0 / f64::from(config.occupancy.cells)),
+            ("STEP_MIN", least),
+            ("STEP_MAX", most),
             ("CONE", config.march.cone),
             ("SAMPLES_PER_RAY", config.march.samples_per_ray),
             ("LONGEST_STEP", config.march.longest_step),
             ("STEP_SHRINKAGE", STEP_SHRINKAGE),
             ("STEP_GROWTH", STEP_GROWTH),
-            ("DENSITY_SCALE", self.density_scale()),
-            ("T_NEAR", config.march.near / self.density_scale()),
+            ("DENSITY_SCALE", space.cubes_per_box()),
+            ("T_NEAR", space.near(&config.march)),
             ("WEIGHT_FLOOR", self.weight_floor()),
             ("LIGHT_SHARE", config.selection.light_share.max(1e-6)),
             ("STOP_TRANSMITTANCE", config.selection.stop_transmittance),
@@ -108,7 +109,7 @@ impl Plan {
             ("BETA_1", config.optimizer.beta_1),
             ("BETA_2", config.optimizer.beta_2),
             ("EPSILON", config.optimizer.epsilon),
-            ("L2", config.optimizer.l2),
+            ("L2", self.weight_l2()),
             ("RELATIVE_FLOOR", RELATIVE_FLOOR),
             ("RELATIVE_DARKEST", RELATIVE_DARKEST),
             ("DEPTH_WEIGHT", config.loss.depth),
@@ -119,6 +120,13 @@ impl Plan {
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         let background = config.background.solid().map(|value| value / self.needs.grey);
         source.constant("BACKGROUND", vec3(background))
+    }
+
+    /// The L2 regularisation of the networks' weights, which is added to their gradients.
+    fn weight_l2(&self) -> f64 {
+        let learning =
+            GROUPS.iter().filter(|group| group.name == "mlp").find_map(|group| group.learning.as_ref());
+        learning.map_or(0.0, |learning| (learning.l2)(&self.config.optimizer))
     }
 
     /// Inclusive weights are no shares of one whole, so that none can stand for others.

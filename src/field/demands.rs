@@ -1,6 +1,10 @@
 //! What a plan needs on the device, told before anything is allocated.
 
-use super::{Plan, Traits, Workspace, color, density, march, occupancy, training, viewing};
+use super::layout::Level;
+use super::{
+    Field, Plan, Traits, Workspace, backward, color, composite, density, march, occupancy, optimize, rays,
+    viewing,
+};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::tensor::Element;
@@ -13,8 +17,10 @@ impl Plan {
     /// When it cannot: says what it lacks, and what to change.
     pub fn check(&self, gpu: &Gpu) -> Result<()> {
         Traits::of(gpu).check(self.accumulation, &gpu.info.name)?;
-        let demands =
-            self.training_demands(self.cell_count()).into_iter().chain(self.for_views().viewing_demands());
+        let demands = self
+            .training_demands(self.cell_count())
+            .into_iter()
+            .chain(self.for_views(&self.needs.lenses).viewing_demands());
         for demand in demands {
             demand
                 .check(gpu)
@@ -26,26 +32,29 @@ impl Plan {
     /// Everything but the photos that a training needs, which visits `visible` cells of its occupancy grid.
     #[must_use]
     pub fn training_demands(&self, visible: usize) -> Vec<Demand> {
+        [self.field_demands(true), self.step_demands(visible)].concat()
+    }
+
+    /// What the steps of a training need besides the field and the photos.
+    fn step_demands(&self, visible: usize) -> Vec<Demand> {
         [
+            rays::demands(self),
             march::demands(self),
-            density::parameter_demands(self),
             density::demands(self),
             color::demands(self),
-            training::demands(self),
+            composite::demands(self),
+            backward::demands(self),
+            optimize::demands(self),
             occupancy::demands(visible),
         ]
         .concat()
     }
 
-    /// The plan of a renderer, whose budget does not depend on the training's: every sample may get colour.
-    #[must_use]
-    pub fn for_views(&self) -> Self {
-        let mut plan = self.clone();
-        let batch = &mut plan.config.batch;
-        batch.rays = self.rounds.rays;
-        batch.samples = self.rounds.samples.max(self.rounds.rays);
-        batch.kept = batch.samples;
-        plan
+    /// The field: what describes its levels, and all of its arrays or those that rendering reads.
+    pub(super) fn field_demands(&self, is_whole: bool) -> Vec<Demand> {
+        let levels = Demand::uniform_storage::<Level>("levels", self.layout.levels.len());
+        let arrays = self.arrays().filter(|array| array.rendered || is_whole);
+        [levels].into_iter().chain(arrays.map(|array| array.demand(self))).collect()
     }
 
     /// What rendering needs besides the parameters, as the plan of a renderer.
@@ -82,14 +91,16 @@ fn setting_of(name: &str) -> &'static str {
 }
 
 impl Workspace {
-    /// Room for a training that visits the cells `visible` of its occupancy grid; the photos are added later.
+    /// Room for the steps of a training of `field`, which visits the cells `visible` of its occupancy grid; the photos are
+    /// added later.
     ///
     /// # Errors
     /// When the adapter cannot hold it.
-    pub fn for_training(gpu: &Gpu, plan: &Plan, visible: &[u32]) -> Result<Self> {
+    pub fn for_training(field: &Field, visible: &[u32]) -> Result<Self> {
+        let (gpu, plan) = (field.gpu(), field.plan());
         let mut workspace = Self::default();
-        workspace.allocate(gpu, &plan.training_demands(visible.len()))?;
-        workspace.write(gpu, "levels", &plan.layout.levels);
+        workspace.share(&field.arrays);
+        workspace.allocate(gpu, &plan.step_demands(visible.len()))?;
         workspace.write(gpu, "visible_cells", visible);
         Ok(workspace)
     }

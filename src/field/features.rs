@@ -21,14 +21,10 @@ pub struct Needs {
     pub depth: bool,
     /// Scene-linear brightness that is 1 in the field: that of a typical pixel; 1 for images of 8 or 16 bits.
     pub grey: f32,
-    /// Cascades of the occupancy grid; 1 for a bounded scene.
-    pub cascades: u32,
-    /// Training cameras.
-    pub cameras: usize,
 }
 
 impl Default for Needs {
-    /// One opaque 8-bit photo of a pinhole camera, of a bounded scene.
+    /// One opaque 8-bit photo of a pinhole camera.
     fn default() -> Self {
         Self {
             lenses: [LensKind::Pinhole].into(),
@@ -38,8 +34,6 @@ impl Default for Needs {
             masks: false,
             depth: false,
             grey: 1.0,
-            cascades: 1,
-            cameras: 1,
         }
     }
 }

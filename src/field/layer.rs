@@ -29,7 +29,7 @@ const SHARED: usize = 8;
 
 impl Product {
     /// `layer_store(row, o, Σ_k W[o][k] x[k])`. The weights are `array<vec4<f32>, outputs / 4 * inputs>`, see
-    /// [`crate::field::parameters::Layer`].
+    /// [`crate::field::layout::Layer`].
     #[must_use]
     pub fn forward(self, inputs: usize, outputs: usize) -> String {
         let mut text = self.head("layer_load, layer_store", inputs * outputs / 4);

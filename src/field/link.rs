@@ -27,7 +27,14 @@ pub struct Link {
     variants: Vec<(String, String)>,
     /// Parts that Rust writes.
     written: Vec<(&'static str, String)>,
-    constants: Vec<(&'static str, usize)>,
+    constants: Vec<(&'static str, Constant)>,
+}
+
+/// A number that a kernel knows at compile time.
+#[derive(Clone, Copy, Debug)]
+enum Constant {
+    Count(usize),
+    Float(f64),
 }
 
 impl Link {
@@ -73,7 +80,14 @@ impl Link {
     /// With a constant.
     #[must_use]
     pub fn count(mut self, name: &'static str, value: usize) -> Self {
-        self.constants.push((name, value));
+        self.constants.push((name, Constant::Count(value)));
+        self
+    }
+
+    /// With a constant that is no whole number.
+    #[must_use]
+    pub fn float(mut self, name: &'static str, value: f64) -> Self {
+        self.constants.push((name, Constant::Float(value)));
         self
     }
 
@@ -92,7 +106,10 @@ impl Plan {
     pub fn source(&self, link: &Link) -> Result<Source> {
         ensure!(!link.main.is_empty(), "there is no shader for the kernel '{}'", link.label);
         let source = self.constants(Source::new(&link.label).memory(self.memory));
-        let source = link.constants.iter().fold(source, |source, (name, value)| source.count(name, *value));
+        let source = link.constants.iter().fold(source, |source, (name, value)| match value {
+            Constant::Count(value) => source.count(name, *value),
+            Constant::Float(value) => source.float(name, *value),
+        });
         let mut linker = Linker { plan: self, link, source, seen: Vec::new() };
         linker
             .add(&link.label, &link.main)

@@ -1,235 +1,275 @@
-//! The parameters of a field and their layout: levels of the grid, layers of the networks.
+//! The parameter groups of a field: one table, from which buffers, the state of a training, checkpoints, memory and Adam
+//! follow. One group more is one row here, and its kernels.
 
-use crate::camera::Bounds;
-use crate::camera::Camera;
-use crate::config::{Config, Grid};
-use crate::gpu_struct;
+use super::Plan;
+use super::layout::{FEATURES, Layout};
+use crate::config::Optimizer;
+use crate::gpu::demand::Demand;
+use crate::gpu::tensor::Element;
 
-/// Features per entry of the hash table.
-pub const FEATURES: usize = 2;
-/// Outputs of the density network: the log-density and 15 features.
-pub const DENSITY_OUTPUTS: usize = 16;
-/// Inputs of the colour network: the density network's outputs and 16 harmonics.
-pub const COLOR_INPUTS: usize = DENSITY_OUTPUTS + 16;
-/// Outputs of the colour network, the fourth unused.
-pub const COLOR_OUTPUTS: usize = 4;
-/// Layers start at multiples of this many vec4 (256 bytes), so that each can be bound as a uniform.
-const LAYER_ALIGNMENT: usize = 16;
+/// A group of parameters.
+pub struct Group {
+    /// What kernels and checkpoints call it.
+    pub name: &'static str,
+    place: Place,
+    /// The shape of its numbers.
+    shape: fn(&Plan) -> Vec<usize>,
+    start: Start,
+    /// Whether rendering reads it.
+    rendered: bool,
+    /// How Adam learns it; `None` for what is measured instead.
+    pub learning: Option<Learning>,
+}
 
-gpu_struct! {
-    /// One level of the hash grid.
-    Level {
-        /// Cells per axis.
-        resolution: u32,
-        /// First entry in the table.
-        first: u32,
-        /// Number of entries.
-        entries: u32,
-        /// 1 when every vertex has an entry of its own.
-        dense: u32,
+/// How Adam learns a group.
+pub struct Learning {
+    /// Its learning rate, as a multiple of the schedule's.
+    pub rate: f64,
+    /// Its L2 regularisation.
+    pub l2: fn(&Optimizer) -> f64,
+    /// The numbers that Adam keeps of it: what they are called, where they are, and how many there are per parameter.
+    moments: &'static [(&'static str, Place, usize)],
+    /// Its kernel.
+    pub kernel: Kernel,
+}
+
+impl Learning {
+    /// What the first and the second moments are called; the same where they share an array.
+    #[must_use]
+    pub fn moments(&self) -> [&'static str; 2] {
+        let name =
+            |number: usize| self.moments.get(number.min(self.moments.len() - 1)).map_or("", |row| row.0);
+        [name(0), name(1)]
     }
 }
 
-/// One layer without bias. Weights are stored as vec4 over four outputs: `[outputs / 4][inputs]`.
+/// A kernel of Adam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layer {
-    /// Number of inputs, a multiple of 4.
-    pub inputs: usize,
-    /// Number of outputs, a multiple of 4.
-    pub outputs: usize,
-    /// First vec4 in the weight buffer.
-    pub first_quad: usize,
+pub enum Kernel {
+    /// `adam_table.wgsl`: leaves alone what no gradient touched.
+    Table,
+    /// `adam_dense.wgsl`: all, from the gradients in the buffer of this name, with two arrays of moments.
+    Dense(&'static str),
 }
 
-impl Layer {
-    /// Number of vec4.
-    #[must_use]
-    pub fn quads(&self) -> usize {
-        self.inputs * self.outputs / 4
-    }
-
-    /// Index of the weight from `input` to `output` in the weight buffer, in floats.
-    #[must_use]
-    pub fn index(&self, output: usize, input: usize) -> usize {
-        (self.first_quad + (output / 4) * self.inputs + input) * 4 + output % 4
-    }
+/// Where the numbers of an array are on the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Place {
+    /// In a tensor.
+    Tensor(Element),
+    /// In a buffer that kernels read as uniform.
+    Uniform,
+    /// In a storage buffer.
+    Storage,
 }
 
-/// Sizes and offsets of all parameters.
+/// What an array holds before the first step.
+#[derive(Clone, Copy)]
+enum Start {
+    /// Zeros.
+    Zeros,
+    /// Numbers drawn from a seed.
+    Drawn(fn(&Layout, u32) -> Vec<f32>),
+    /// What follows from the cells that nothing can be in.
+    Cells(fn(&Plan, &[bool]) -> Numbers),
+}
+
+/// The table.
+pub static GROUPS: &[Group] = &[
+    Group {
+        name: "table",
+        place: Place::Tensor(Element::Vec2),
+        shape: |plan| vec![plan.layout.entries, FEATURES],
+        start: Start::Drawn(Layout::initial_table),
+        rendered: true,
+        learning: Some(Learning {
+            rate: 1.0,
+            l2: |_| 0.0,
+            // The first of both features, then the second.
+            moments: &[("table_moments", Place::Tensor(Element::Vec4), 2)],
+            kernel: Kernel::Table,
+        }),
+    },
+    Group {
+        name: "mlp",
+        place: Place::Uniform,
+        shape: |plan| vec![plan.layout.quads, 4],
+        start: Start::Drawn(Layout::initial_weights),
+        rendered: true,
+        learning: Some(Learning {
+            rate: 1.0,
+            l2: |optimizer| optimizer.l2,
+            moments: &[("mlp_first", Place::Storage, 1), ("mlp_second", Place::Storage, 1)],
+            kernel: Kernel::Dense("d_weights"),
+        }),
+    },
+    Group {
+        name: "occupancy",
+        place: Place::Storage,
+        shape: |plan| plan.space.grid_shape(plan.config.occupancy.cells).to_vec(),
+        start: Start::Cells(occupancy),
+        rendered: false,
+        learning: None,
+    },
+    Group {
+        name: "occupancy_bits",
+        place: Place::Tensor(Element::Word),
+        shape: |plan| vec![plan.cell_count() / 32],
+        start: Start::Cells(occupancy_bits),
+        rendered: true,
+        learning: None,
+    },
+];
+
+/// Optical depths over the least step. The networks begin with a log-density of about 0; cells that nothing can be in have
+/// -1.
+fn occupancy(plan: &Plan, hidden: &[bool]) -> Numbers {
+    let initial = plan.least_step() as f32;
+    Numbers::Floats(hidden.iter().map(|&hidden| if hidden { -1.0 } else { initial }).collect())
+}
+
+fn occupancy_bits(_: &Plan, hidden: &[bool]) -> Numbers {
+    let word = |cells: &[bool]| (0..32).fold(0, |word, bit| word | (u32::from(!cells[bit]) << bit));
+    Numbers::Words(hidden.chunks_exact(32).map(word).collect())
+}
+
+/// The numbers of an array.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Layout {
-    /// Levels of the grid, coarsest first.
-    pub levels: Vec<Level>,
-    /// Entries of the table over all levels.
-    pub entries: usize,
-    /// The density network's layers.
-    pub density: Vec<Layer>,
-    /// The colour network's layers.
-    pub color: Vec<Layer>,
-    /// Number of vec4 in the weight buffer.
-    pub quads: usize,
+pub enum Numbers {
+    /// Floats.
+    Floats(Vec<f32>),
+    /// Words.
+    Words(Vec<u32>),
 }
 
-impl Layout {
-    /// The layout that `config` describes, the finest level having `finest` cells per axis.
+impl Numbers {
+    /// How many there are.
     #[must_use]
-    pub fn new(config: &Config, finest: u32) -> Self {
-        let levels = grid_levels(config, finest);
-        let entries = levels.last().map_or(0, |level| (level.first + level.entries) as usize);
-        let width = config.network.width;
-        let encoding = config.grid.levels * FEATURES;
-        let mut quads = 0;
-        let mut chain = |sizes: &[usize]| -> Vec<Layer> {
-            sizes
-                .windows(2)
-                .map(|pair| {
-                    let layer = Layer { inputs: pair[0], outputs: pair[1], first_quad: quads };
-                    quads += layer.quads().next_multiple_of(LAYER_ALIGNMENT);
-                    layer
-                })
-                .collect()
-        };
-        let density = chain(&[encoding, width, DENSITY_OUTPUTS]);
-        let mut sizes = vec![COLOR_INPUTS];
-        sizes.extend(std::iter::repeat_n(width, config.network.color_layers));
-        sizes.push(COLOR_OUTPUTS);
-        let color = chain(&sizes);
-        Self { levels, entries, density, color, quads }
-    }
-
-    /// Features of an encoded position.
-    #[must_use]
-    pub fn encoding(&self) -> usize {
-        self.levels.len() * FEATURES
-    }
-
-    /// Table entries drawn uniformly from ±1e-4, as Müller et al. do.
-    #[must_use]
-    pub fn initial_table(&self, seed: u32) -> Vec<f32> {
-        let mut random = Random::new(seed, 1);
-        (0..self.entries * FEATURES).map(|_| (random.uniform() * 2.0 - 1.0) * 1e-4).collect()
-    }
-
-    /// Weights drawn uniformly as Glorot & Bengio (2010) do; unused outputs are 0 and stay so.
-    #[must_use]
-    pub fn initial_weights(&self, seed: u32) -> Vec<f32> {
-        let mut random = Random::new(seed, 2);
-        let mut weights = vec![0.0; self.quads * 4];
-        let last = self.color.len() - 1;
-        for (number, layer) in self.density.iter().chain(&self.color).enumerate() {
-            let is_color = number == self.density.len() + last;
-            let used = if is_color { 3 } else { layer.outputs };
-            let most = (6.0 / (layer.inputs + used) as f32).sqrt();
-            for output in 0..used {
-                for input in 0..layer.inputs {
-                    weights[layer.index(output, input)] = (random.uniform() * 2.0 - 1.0) * most;
-                }
-            }
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Floats(numbers) => numbers.len(),
+            Self::Words(numbers) => numbers.len(),
         }
-        weights
+    }
+
+    /// The floats; none of words.
+    #[must_use]
+    pub fn floats(&self) -> &[f32] {
+        match self {
+            Self::Floats(numbers) => numbers,
+            Self::Words(_) => &[],
+        }
     }
 }
 
-fn grid_levels(config: &Config, finest: u32) -> Vec<Level> {
-    let count = config.grid.levels;
-    let base = f64::from(config.grid.base);
-    let growth = (f64::from(finest.max(config.grid.base)) / base).powf(1.0 / (count - 1) as f64);
-    let largest = 1u64 << config.grid.log2_table;
-    let mut first = 0;
-    (0..count)
-        .map(|level| {
-            let resolution = (base * growth.powi(level as i32) + 0.5).floor() as u64;
-            let vertices = (resolution + 1).pow(3);
-            let dense = vertices <= largest;
-            let entries = if dense { vertices.next_multiple_of(2) } else { largest } as u32;
-            let level = Level { resolution: resolution as u32, first, entries, dense: u32::from(dense) };
-            first += entries;
-            level
+/// An array that the state of a training has: the parameters of a group, or what Adam keeps of them.
+#[derive(Clone)]
+pub struct Array {
+    /// What kernels and checkpoints call it.
+    pub name: &'static str,
+    /// The shape of its numbers, of 32 bits each.
+    pub shape: Vec<usize>,
+    /// Whether rendering reads it.
+    pub rendered: bool,
+    place: Place,
+    start: Start,
+}
+
+impl Array {
+    /// How many numbers it has.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Whether its numbers are words.
+    #[must_use]
+    pub fn has_words(&self) -> bool {
+        self.place == Place::Tensor(Element::Word)
+    }
+
+    /// What it holds before the first step of a training where nothing can be in the `hidden` cells.
+    #[must_use]
+    pub fn start(&self, plan: &Plan, hidden: &[bool]) -> Numbers {
+        match self.start {
+            Start::Zeros => Numbers::Floats(vec![0.0; self.count()]),
+            Start::Drawn(draw) => Numbers::Floats(draw(&plan.layout, plan.config.seed)),
+            Start::Cells(from) => from(plan, hidden),
+        }
+    }
+
+    /// Its room on the device.
+    #[must_use]
+    pub fn demand(&self, plan: &Plan) -> Demand {
+        match self.place {
+            Place::Tensor(element) => plan.tensor(self.name, element, self.count() * 4 / element.bytes()),
+            Place::Uniform => Demand::uniform_storage::<u32>(self.name, self.count()),
+            Place::Storage => Demand::storage::<u32>(self.name, self.count()),
+        }
+    }
+}
+
+impl Plan {
+    /// The arrays of the state of a training, group by group. A group without numbers has none.
+    pub fn arrays(&self) -> impl Iterator<Item = Array> {
+        GROUPS.iter().flat_map(|group| {
+            let shape = (group.shape)(self);
+            let Group { name, place, start, rendered, .. } = *group;
+            let own = Array { name, shape: shape.clone(), rendered, place, start };
+            let moments = group.learning.iter().flat_map(|learning| learning.moments);
+            let moments = moments.map(move |&(name, place, per_parameter)| {
+                let mut shape = shape.clone();
+                shape.iter_mut().last().into_iter().for_each(|inner| *inner *= per_parameter);
+                Array { name, shape, rendered: false, place, start: Start::Zeros }
+            });
+            [own].into_iter().chain(moments).filter(|array| array.count() > 0)
         })
-        .collect()
-}
-
-/// Finest cells along a pixel of a training view.
-const CELLS_PER_PIXEL: f64 = 1.5;
-/// Most cells per axis of a scene with cascades, whose far cubes no view sees that sharply.
-const MOST_CELLS_WITH_CASCADES: f64 = 4096.0;
-/// Most cells per axis of any scene.
-const MOST_CELLS: f64 = 65536.0;
-
-/// Cells per axis of the finest level: what the configuration says or, where it leaves them open, one and a half along
-/// what a pixel of the median training view covers at the box's centre.
-#[must_use]
-pub fn finest_resolution(grid: &Grid, bounds: &Bounds, cameras: &[Camera]) -> u32 {
-    if grid.finest > 0 {
-        return grid.finest;
-    }
-    let sharpness = |camera: &Camera| {
-        camera.pixels_per_length(camera.position().distance(bounds.center).max(0.1 * bounds.half))
-    };
-    let mut pixels_per_length: Vec<f64> = cameras.iter().map(sharpness).collect();
-    pixels_per_length.sort_by(f64::total_cmp);
-    let middle = pixels_per_length.get(cameras.len() / 2).copied().unwrap_or(0.0);
-    let most = if bounds.cascades > 1 { MOST_CELLS_WITH_CASCADES } else { MOST_CELLS };
-    let cells = CELLS_PER_PIXEL * 2.0 * bounds.outer_half() * middle;
-    (cells.min(most) as u32).max(grid.base)
-}
-
-/// The project's integer hash (PCG, Jarzynski & Olano 2020), the same as in the kernels.
-#[must_use]
-pub fn pcg(value: u32) -> u32 {
-    let state = value.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    (word >> 22) ^ word
-}
-
-/// A sequence of random numbers for the initial parameters.
-struct Random {
-    stream: u32,
-    index: u32,
-}
-
-impl Random {
-    fn new(seed: u32, stream: u32) -> Self {
-        Self { stream: pcg(stream.wrapping_add(pcg(seed))), index: 0 }
     }
 
-    /// Uniform in [0, 1).
-    fn uniform(&mut self) -> f32 {
-        self.index += 1;
-        (pcg(self.index.wrapping_add(self.stream)) >> 8) as f32 / (1 << 24) as f32
+    /// Bytes of all of them.
+    #[must_use]
+    pub fn state_bytes(&self) -> u64 {
+        self.arrays().map(|array| 4 * array.count() as u64).sum()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Lens;
-    use glam::{DAffine3, DVec2, DVec3};
+    use crate::camera::Bounds;
+    use crate::config::Config;
+    use crate::field::{Needs, Traits};
+    use glam::DVec3;
 
     #[test]
-    fn the_finest_cells_follow_the_pixels() {
-        let camera = |distance: f64| Camera {
-            width: 100,
-            height: 100,
-            focal_px: DVec2::splat(200.0),
-            center_px: DVec2::splat(50.0),
-            lens: Lens::Pinhole,
-            world_from_camera: DAffine3::from_translation(DVec3::new(distance, 0.0, 0.0)),
-        };
-        let cameras = [camera(2.0), camera(4.0), camera(40.0)];
-        let open = |base| Grid { base, ..Grid::default() };
-        let bounds = |cascades| Bounds { center: DVec3::ZERO, half: 1.0, cascades, source: String::new() };
-        // 200 px / 4 = 50 pixels per unit, 100 across the box of side 2, 150 cells.
-        assert_eq!(finest_resolution(&open(16), &bounds(1), &cameras), 150);
-        assert_eq!(finest_resolution(&open(16), &bounds(3), &cameras), 600);
-        assert_eq!(finest_resolution(&open(16), &bounds(8), &cameras), 4096);
-        assert_eq!(finest_resolution(&open(256), &bounds(1), &cameras), 256);
-        assert_eq!(finest_resolution(&open(16), &bounds(1), &[]), 16);
-        assert_eq!(finest_resolution(&open(16), &bounds(1), &[camera(0.0)]), 6000);
-        // Parallel rays are as dense at any distance.
-        let parallel = Camera { lens: Lens::Orthographic, ..camera(40.0) };
-        assert_eq!(finest_resolution(&open(16), &bounds(1), &[parallel]), 600);
-        let sphere = Camera { lens: Lens::Equirectangular, ..camera(4.0) };
-        assert_eq!(finest_resolution(&open(16), &bounds(1), &[sphere]), 150);
+    fn arrays_follow_the_table() {
+        let mut config = Config::default();
+        config.grid.finest = 64;
+        config.occupancy.cells = 16;
+        let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades: 2, source: String::new() };
+        let plan = Plan::suited_to(Traits::GPU, config, Needs::default(), (&bounds).into());
+        let (entries, quads) = (plan.layout.entries, plan.layout.quads);
+        let arrays: Vec<_> =
+            plan.arrays().map(|array| (array.name, array.shape.clone(), array.rendered)).collect();
+        let expected = [
+            ("table", vec![entries, 2], true),
+            ("table_moments", vec![entries, 4], false),
+            ("mlp", vec![quads, 4], true),
+            ("mlp_first", vec![quads, 4], false),
+            ("mlp_second", vec![quads, 4], false),
+            ("occupancy", vec![2, 16, 16, 16], false),
+            ("occupancy_bits", vec![256], true),
+        ];
+        assert_eq!(arrays, expected);
+        let mut hidden = vec![false; plan.cell_count()];
+        hidden[33] = true;
+        for array in plan.arrays() {
+            let start = array.start(&plan, &hidden);
+            assert_eq!(start.count(), array.count(), "{}", array.name);
+            assert_eq!(array.has_words(), matches!(start, Numbers::Words(_)));
+            assert_eq!(array.demand(&plan).bytes(), 4 * array.count() as u64);
+        }
+        assert_eq!(occupancy(&plan, &hidden).floats()[33], -1.0);
+        assert_eq!(occupancy_bits(&plan, &hidden), Numbers::Words([&[!0, !2][..], &vec![!0; 254]].concat()));
     }
 }

@@ -3,15 +3,17 @@
 //! Parts for what a scene does not need (a lens, cascades, alpha, …) are not linked, their buffers are not
 //! allocated and their stages are not dispatched.
 
-use super::{Link, Needs, Workspace, layer, march, shared, viewing};
+use super::layout::Layout;
+use super::{Capacity, Link, Needs, Space, Workspace, layer, shared, viewing};
+use crate::camera::LensKind;
 use crate::config::{Accumulation, ColorLoss, Config};
-use crate::field::parameters::Layout;
 use crate::gpu::Gpu;
 use crate::gpu::kernel::Kernel;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Memory;
 use crate::support::file::write_atomically;
 use anyhow::{Result, ensure};
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
@@ -44,6 +46,10 @@ pub struct Plan {
     pub layout: Layout,
     /// What the scene needs.
     pub needs: Needs,
+    /// Where the scene is.
+    pub space: Space,
+    /// What there is room for.
+    pub capacity: Capacity,
     /// How matrix products are written.
     pub product: layer::Product,
     /// How the table's gradients are summed.
@@ -105,16 +111,18 @@ impl Traits {
 }
 
 impl Plan {
-    /// Chooses what depends on the adapter.
+    /// Chooses what depends on the adapter; `grid.finest` is never 0.
     #[must_use]
-    pub fn new(gpu: &Gpu, config: Config, layout: Layout, needs: Needs) -> Self {
-        Self::suited_to(Traits::of(gpu), config, layout, needs)
+    pub fn new(gpu: &Gpu, config: Config, needs: Needs, space: Space) -> Self {
+        Self::suited_to(Traits::of(gpu), config, needs, space)
     }
 
     /// As [`Plan::new`], for an adapter that need not be there.
     #[must_use]
-    pub fn suited_to(adapter: Traits, config: Config, layout: Layout, needs: Needs) -> Self {
-        let orders = adapter.is_cpu && march::kept_capacity(&config.batch) <= LONGEST_LOOP;
+    pub fn suited_to(adapter: Traits, config: Config, needs: Needs, space: Space) -> Self {
+        let layout = Layout::new(&config);
+        let capacity = Capacity::of_steps(&config.batch);
+        let orders = adapter.is_cpu && capacity.kept <= LONGEST_LOOP;
         let accumulation = match config.accumulation {
             Accumulation::Ordered if adapter.is_cpu && !orders => Accumulation::Fixed,
             Accumulation::Auto if orders => Accumulation::Ordered,
@@ -132,31 +140,39 @@ impl Plan {
         let chunks = if adapter.is_cpu { 32 } else { 512 };
         let product = layer::Product { rows, shared_weights };
         let rounds = viewing::Rounds::suited_to(adapter);
-        Self { config, layout, needs, product, accumulation, memory: adapter.memory, chunks, rounds }
+        let memory = adapter.memory;
+        Self { config, layout, needs, space, capacity, product, accumulation, memory, chunks, rounds }
     }
 
-    /// The smallest step in box units.
+    /// The plan of a renderer of the same field for cameras with `lenses`, whose room does not depend on the training's.
     #[must_use]
-    pub fn step_min(&self) -> f64 {
-        3f64.sqrt() / f64::from(self.config.march.steps) / self.density_scale()
+    pub fn for_views(&self, lenses: &BTreeSet<LensKind>) -> Self {
+        let needs = Needs { lenses: lenses.clone(), ..self.needs.clone() };
+        Self { needs, capacity: Capacity::of_rounds(&self.rounds), ..self.clone() }
     }
 
-    /// Inner cubes along the box: densities are per inner cube.
+    /// The least and the largest step of a ray, in box units.
     #[must_use]
-    pub fn density_scale(&self) -> f64 {
-        f64::from(1u32 << (self.needs.cascades - 1))
+    pub fn step_range(&self) -> [f64; 2] {
+        self.space.step_range(&self.config.march, self.config.occupancy.cells)
+    }
+
+    /// The least step in sides of the inner cube: what an optical depth of the occupancy grid is told over.
+    #[must_use]
+    pub fn least_step(&self) -> f64 {
+        self.step_range()[0] * self.space.cubes_per_box()
     }
 
     /// Cells of the occupancy grid over all cascades.
     #[must_use]
     pub fn cell_count(&self) -> usize {
-        (self.config.occupancy.cells as usize).pow(3) * self.needs.cascades as usize
+        self.space.grid_shape(self.config.occupancy.cells).iter().product()
     }
 
     /// Marched samples that a step aims at, so that they usually fit.
     #[must_use]
     pub fn target_samples(&self) -> usize {
-        self.config.batch.samples / 8 * 7
+        self.capacity.samples / 8 * 7
     }
 
     /// Words that hold one bit per step of a ray.
@@ -182,6 +198,12 @@ impl Plan {
     /// A kernel over a count that the device knows, one of [`dispatch`], bound to what it uses.
     pub(crate) fn stage(&self, gpu: &Gpu, workspace: &Workspace, link: &Link, over: usize) -> Result<Stage> {
         workspace.stage(workspace.bind(gpu, &self.kernel(gpu, link)?, &[])?, over)
+    }
+
+    /// Whether the loss has use for distances along rays.
+    #[must_use]
+    pub fn needs_distances(&self) -> bool {
+        self.needs.depth || self.config.loss.distortion > 0.0
     }
 
     /// Whether colour errors count relative to the colour.

@@ -1,10 +1,10 @@
 //! The renderer: a trained field seen by any camera, front to back in rounds of a few samples per ray.
 
-use crate::camera::Bounds;
 use crate::camera::{Camera, LensKind};
-use crate::field::{self, Counters, Plan, Progress, Workspace, color, density, dispatch, march, viewing};
+use crate::field::{
+    self, Counters, Field, Plan, Progress, StepExcess, Workspace, color, density, dispatch, march, viewing,
+};
 use crate::gpu::Gpu;
-use crate::gpu::buffer::Buffer;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
 use anyhow::{Result, bail};
@@ -12,9 +12,6 @@ use std::collections::BTreeSet;
 use std::iter::repeat_n;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Names of the buffers that a renderer shares with a trainer, or fills from a checkpoint.
-pub const PARAMETERS: [&str; 5] = ["levels", "table", "mlp", "occupancy", "occupancy_bits"];
 
 /// Most rounds of one submission: drivers give up on those that take seconds.
 const MOST_ROUNDS: usize = 8;
@@ -46,34 +43,20 @@ pub struct Renderer {
     refill: Stage,
     /// The others.
     round: Vec<Stage>,
-    bounds: Bounds,
     /// Rounds that the last band of pixels took.
     rounds: usize,
-    /// By how much steps along rays are longer than the configuration's, as a share of them: those that the field was
-    /// trained with.
-    pub step_excess: f32,
-    /// The counters of the training that the field is in, which has its present steps.
-    training: Option<Buffer>,
+    step_excess: StepExcess,
 }
 
 impl Renderer {
-    /// A renderer of the field whose parameters `field` holds, for cameras with `lenses`.
+    /// A renderer of a field, for cameras with `lenses`.
     ///
     /// # Errors
     /// When the adapter cannot hold a round or refuses a kernel.
-    pub fn new(
-        gpu: &Arc<Gpu>,
-        plan: &Plan,
-        field: &Workspace,
-        bounds: &Bounds,
-        lenses: &BTreeSet<LensKind>,
-    ) -> Result<Self> {
-        let mut plan = plan.for_views();
-        plan.needs.lenses.clone_from(lenses);
+    pub fn new(field: &Field, lenses: &BTreeSet<LensKind>) -> Result<Self> {
+        let (gpu, plan) = (&field.gpu, field.plan.for_views(lenses));
         let mut workspace = Workspace::default();
-        for name in PARAMETERS {
-            workspace.share(field, name);
-        }
+        workspace.share(&field.arrays);
         workspace.allocate(gpu, &plan.viewing_demands())?;
         let refill = march::scan(gpu, &plan, &workspace, march::Scanned::Free)?;
         let mut round = vec![viewing::rays(gpu, &plan, &workspace)?];
@@ -81,24 +64,21 @@ impl Renderer {
         round.extend(density::stages(gpu, &plan, &workspace)?);
         round.extend(color::stages(gpu, &plan, &workspace, color::Selection::View)?);
         round.push(viewing::composite(gpu, &plan, &workspace)?);
-        let (gpu, bounds) = (Arc::clone(gpu), bounds.clone());
         Ok(Self {
-            gpu,
+            gpu: Arc::clone(gpu),
             plan,
             workspace,
             refill,
             round,
-            bounds,
             rounds: 1,
-            step_excess: 0.0,
-            training: field.find("counters").cloned(),
+            step_excess: field.step_excess.clone(),
         })
     }
 
     /// Bytes on the device that a renderer of `plan` takes besides the parameters.
     #[must_use]
     pub fn bytes(plan: &Plan) -> u64 {
-        plan.for_views().viewing_demands().iter().map(Demand::bytes).sum()
+        plan.for_views(&plan.needs.lenses).viewing_demands().iter().map(Demand::bytes).sum()
     }
 
     /// Renders what `camera` sees.
@@ -115,33 +95,34 @@ impl Renderer {
                 kind.name()
             );
         }
-        if let Some(counters) = &self.training {
-            self.step_excess = self.gpu.read::<Counters>(counters, 0, 1)?[0].step_excess;
-        }
+        let step_excess = match &self.step_excess {
+            StepExcess::Known(excess) => *excess,
+            StepExcess::Counted(counters) => self.gpu.read::<Counters>(counters, 0, 1)?[0].step_excess,
+        };
         let pixels = camera.width as usize * camera.height as usize;
         let mut color = Vec::with_capacity(pixels);
         let mut depth = Vec::with_capacity(pixels);
-        let camera_in_box = field::Camera::in_box(camera, &self.bounds);
+        let camera_in_box = field::Camera::in_box(camera, &self.plan.space);
         self.workspace.write(&self.gpu, "view_camera", &[camera_in_box]);
         while color.len() < pixels {
             let band = self.plan.rounds.band.min(pixels - color.len());
-            self.render_band(color.len()..color.len() + band)?;
+            self.render_band(color.len()..color.len() + band, step_excess)?;
             let pixels: Vec<viewing::Pixel> = self.workspace.read(&self.gpu, "view_pixels", band)?;
             color.extend(pixels.iter().map(|&[r, g, b, alpha, _]| [r, g, b, alpha]));
             depth.extend(pixels.iter().map(|&[.., depth]| depth));
         }
         let grey = self.plan.needs.grey;
         color.iter_mut().flat_map(|pixel| &mut pixel[..3]).for_each(|value| *value *= grey);
-        let world_per_box = (self.bounds.outer_half() * 2.0) as f32;
+        let world_per_box = self.plan.space.world_per_box() as f32;
         depth.iter_mut().for_each(|z| *z *= world_per_box);
         Ok(View { width: camera.width, height: camera.height, color, depth })
     }
 
     /// Renders a band of pixels. As many rounds as the last band took are submitted before the device is asked whether
     /// rays are left, and few more at a time after that.
-    fn render_band(&mut self, band: Range<usize>) -> Result<()> {
-        self.begin_band(&band);
-        let rays = self.plan.config.batch.rays;
+    fn render_band(&mut self, band: Range<usize>, step_excess: f32) -> Result<()> {
+        self.begin_band(&band, step_excess);
+        let rays = self.plan.capacity.rays;
         // A ray has a sample or more in each of its rounds, and no slot stays free.
         let most = (band.len() / rays + 1) * (self.plan.config.march.most_steps + 1);
         let (mut submitted, mut more) = (0, self.rounds);
@@ -170,13 +151,13 @@ impl Renderer {
     }
 
     /// Frees every slot, and gives each that is needed a pixel.
-    fn begin_band(&self, band: &Range<usize>) {
+    fn begin_band(&self, band: &Range<usize>, step_excess: f32) {
         let Self { gpu, workspace, .. } = self;
-        let rays = self.plan.config.batch.rays.min(band.len()) as u32;
+        let rays = self.plan.capacity.rays.min(band.len()) as u32;
         workspace.write(
             gpu,
             "counters",
-            &[Counters { rays, step_excess: STEP_EXCESS * self.step_excess, ..Counters::default() }],
+            &[Counters { rays, step_excess: STEP_EXCESS * step_excess, ..Counters::default() }],
         );
         workspace.set_dispatch(gpu, dispatch::RAYS, rays as usize);
         let (begin, end) = (band.start as u32, band.end as u32);

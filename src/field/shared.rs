@@ -1,11 +1,11 @@
 //! The structs that kernels and the host share.
 
+use super::Space;
+use super::backward::Tile;
 use super::lenses;
-use super::training::Tile;
-use crate::camera::Bounds;
 use crate::camera::Lens;
 use crate::config::Optimizer;
-use crate::field::parameters::Level;
+use crate::field::layout::Level;
 use crate::gpu::kernel::{Layout, Shared};
 use crate::gpu_struct;
 
@@ -166,11 +166,11 @@ gpu_struct! {
 }
 
 impl Camera {
-    /// `camera` in the space where the scene's box is the unit cube, without a photo.
+    /// `camera` in box space, without a photo.
     #[must_use]
-    pub fn in_box(camera: &crate::camera::Camera, bounds: &Bounds) -> Self {
+    pub fn in_box(camera: &crate::camera::Camera, space: &Space) -> Self {
         let pose = camera.world_from_camera;
-        let side = 2.0 * bounds.outer_half();
+        let side = space.world_per_box();
         let axis = |axis: glam::DVec3| axis.normalize_or_zero().as_vec3().to_array();
         let (radial, tangential) = match camera.lens {
             Lens::OpenCv { k, p } => (k, p),
@@ -183,7 +183,7 @@ impl Camera {
             _ => camera.focal_px,
         };
         Self {
-            origin: ((pose.translation - bounds.min()) / side).as_vec3().to_array(),
+            origin: space.in_box(pose.translation).as_vec3().to_array(),
             width: camera.width,
             right: axis(pose.matrix3.x_axis),
             height: camera.height,

@@ -3,14 +3,18 @@
 //! It knows neither files nor progress bars: a step is a list of dispatches, and [`Trainer::report`] says
 //! what happened since the last report.
 
-use crate::field::parameters::{FEATURES, pcg};
+use crate::field::layout::pcg;
+use crate::field::parameters::Numbers;
 use crate::field::views::Views;
 use crate::field::visibility::hidden_cells;
-use crate::field::{Counters, Plan, Step, Workspace, color, density, dispatch, march, occupancy, training};
+use crate::field::{
+    Counters, Field, Plan, Step, StepExcess, Workspace, backward, color, composite, density, dispatch, march,
+    occupancy, optimize, rays,
+};
 use crate::gpu::Gpu;
 use crate::gpu::pass::Stage;
 use crate::gpu::timer::Timer;
-use anyhow::{Result, bail};
+use anyhow::Result;
 use std::sync::Arc;
 
 /// The name under which a timer finds the updates of the occupancy grid.
@@ -19,15 +23,14 @@ const OCCUPANCY: &str = "occupancy grid";
 /// Trains one field on one device.
 #[derive(Debug)]
 pub struct Trainer {
-    gpu: Arc<Gpu>,
-    plan: Plan,
+    field: Field,
     workspace: Workspace,
     stages: Vec<Stage>,
     occupancy: occupancy::Update,
     step: u32,
     visible_cells: u32,
-    /// What every cell of the occupancy grid starts from; -1 where nothing can be.
-    first_occupancy: Vec<f32>,
+    /// Cells of the occupancy grid that nothing can be in.
+    hidden: Vec<bool>,
 }
 
 /// What happened in the steps since the last report, per step.
@@ -58,10 +61,24 @@ pub struct State {
     pub rays: u32,
     /// By how much its steps along the rays are longer than the configuration's, as a share of them.
     pub step_excess: f32,
-    /// The buffers of [`training::STATE`], in that order.
-    pub buffers: Vec<Vec<f32>>,
-    /// One bit per occupied cell.
-    pub occupancy_bits: Vec<u32>,
+    /// The numbers of the plan's [arrays](Plan::arrays), in that order.
+    pub arrays: Vec<(&'static str, Numbers)>,
+}
+
+impl State {
+    /// The numbers of an array of floats; none where there is no such array.
+    #[must_use]
+    pub fn floats(&self, name: &str) -> &[f32] {
+        self.arrays.iter().find(|(own, _)| *own == name).map_or(&[], |(_, numbers)| numbers.floats())
+    }
+
+    /// The same, to be changed.
+    pub fn floats_mut(&mut self, name: &str) -> &mut [f32] {
+        match self.arrays.iter_mut().find(|(own, _)| *own == name) {
+            Some((_, Numbers::Floats(numbers))) => numbers,
+            _ => &mut [],
+        }
+    }
 }
 
 impl Trainer {
@@ -69,34 +86,22 @@ impl Trainer {
     ///
     /// # Errors
     /// When a photo is missing, or the adapter cannot hold the table or the batch or refuses a kernel.
-    pub fn new(gpu: &Arc<Gpu>, mut plan: Plan, views: Views) -> Result<Self> {
+    pub fn new(mut field: Field, views: Views) -> Result<Self> {
         views.check()?;
-        plan.check(gpu)?;
-        // Photos of which nothing can be drawn are never chosen.
-        plan.needs.cameras = views.on_device.len();
+        let (gpu, plan) = (Arc::clone(&field.gpu), field.plan.clone());
+        plan.check(&gpu)?;
         let hidden =
-            hidden_cells(&views.cameras, &views.silhouettes, &views.bounds, plan.config.occupancy.cells);
+            hidden_cells(&views.cameras, &views.silhouettes, &views.space, plan.config.occupancy.cells);
         let visible: Vec<u32> =
             (0..).zip(&hidden).filter(|(_, hidden)| !**hidden).map(|(cell, _)| cell).collect();
-        let mut workspace = Workspace::for_training(gpu, &plan, &visible)?;
+        let mut workspace = Workspace::for_training(&field, &visible)?;
         workspace.add(gpu.storage_with("cameras", &views.on_device)?);
         workspace.add_banks(views.banks);
-        let stages = step_stages(gpu, &plan, &workspace)?;
-        let occupancy = occupancy::Update::new(gpu, &plan, &workspace)?;
-        // The networks begin with a log-density of about 0.
-        let initial = (plan.step_min() * plan.density_scale()) as f32;
-        let first_occupancy = hidden.iter().map(|&hidden| if hidden { -1.0 } else { initial }).collect();
+        let stages = step_stages(&gpu, &plan, &workspace, views.on_device.len())?;
+        let occupancy = occupancy::Update::new(&gpu, &plan, &workspace)?;
         let visible_cells = visible.len() as u32;
-        let mut trainer = Self {
-            gpu: Arc::clone(gpu),
-            plan,
-            workspace,
-            stages,
-            occupancy,
-            step: 0,
-            first_occupancy,
-            visible_cells,
-        };
+        field.step_excess = StepExcess::Counted(workspace.get("counters").clone());
+        let mut trainer = Self { field, workspace, stages, occupancy, step: 0, hidden, visible_cells };
         trainer.reset()?;
         Ok(trainer)
     }
@@ -108,7 +113,7 @@ impl Trainer {
     pub fn warm_up(&mut self) -> Result<()> {
         self.step(0.0, None)?;
         self.refresh_occupancy(None)?;
-        self.gpu.wait()?;
+        self.field.gpu.wait()?;
         self.reset()
     }
 
@@ -117,22 +122,11 @@ impl Trainer {
     /// # Errors
     /// When the device was lost.
     pub fn reset(&mut self) -> Result<()> {
-        let seed = self.plan.config.seed;
-        let layout = &self.plan.layout;
-        let buffers = training::STATE
-            .iter()
-            .map(|&name| match name {
-                "table" => layout.initial_table(seed),
-                "mlp" => layout.initial_weights(seed),
-                "occupancy" => self.first_occupancy.clone(),
-                moments => vec![0.0; self.state_length(moments)],
-            })
-            .collect();
-        let rays = self.plan.config.batch.first_rays;
-        let bits = |cells: &[f32]| (0..32).fold(0, |word, bit| word | (u32::from(cells[bit] >= 0.0) << bit));
-        let occupancy_bits = self.first_occupancy.chunks_exact(32).map(bits).collect();
-        let step_excess = (self.plan.config.march.longest_step - 1.0) as f32;
-        self.restore(&State { step: 0, rays, step_excess, buffers, occupancy_bits })
+        let plan = &self.field.plan;
+        let arrays = plan.arrays().map(|array| (array.name, array.start(plan, &self.hidden))).collect();
+        let rays = plan.config.batch.first_rays;
+        let step_excess = (plan.config.march.longest_step - 1.0) as f32;
+        self.restore(&State { step: 0, rays, step_excess, arrays })
     }
 
     /// Goes on from `state`.
@@ -140,27 +134,17 @@ impl Trainer {
     /// # Errors
     /// When the state is of another layout, or the device was lost.
     pub fn restore(&mut self, state: &State) -> Result<()> {
-        for (&name, data) in training::STATE.iter().zip(&state.buffers) {
-            let expected = self.state_length(name);
-            if data.len() != expected {
-                bail!(
-                    "the state's '{name}' has {} numbers, and this configuration needs {expected}",
-                    data.len()
-                );
-            }
-            self.workspace.write(&self.gpu, name, data);
-        }
-        self.workspace.write(&self.gpu, "occupancy_bits", &state.occupancy_bits);
+        self.field.set_arrays(&state.arrays)?;
         let State { rays, step_excess, .. } = *state;
         let counters = Counters { rays, rays_used: 1, step_excess, ..Counters::default() };
-        self.gpu.write(self.workspace.get("counters"), 0, &[counters]);
-        self.workspace.set_dispatch(&self.gpu, dispatch::RAYS, state.rays as usize);
-        let mut encoder = self.gpu.encoder("restore");
+        self.field.gpu.write(self.workspace.get("counters"), 0, &[counters]);
+        self.workspace.set_dispatch(&self.field.gpu, dispatch::RAYS, state.rays as usize);
+        let mut encoder = self.field.gpu.encoder("restore");
         self.workspace.tensor("d_table").clear(&mut encoder);
         encoder.clear_buffer(&self.workspace.get("gradient_range").raw, 0, None);
-        self.gpu.submit(encoder);
+        self.field.gpu.submit(encoder);
         self.step = state.step;
-        self.gpu.wait()
+        self.field.gpu.wait()
     }
 
     /// Everything a later [`Trainer::restore`] needs.
@@ -168,27 +152,13 @@ impl Trainer {
     /// # Errors
     /// When the device was lost.
     pub fn state(&self) -> Result<State> {
-        let read = |name: &&str| self.workspace.read::<f32>(&self.gpu, name, self.state_length(name));
-        let buffers = training::STATE.iter().map(read).collect::<Result<_>>()?;
-        let counters = self.gpu.read::<Counters>(self.workspace.get("counters"), 0, 1)?[0];
+        let counters = self.field.gpu.read::<Counters>(self.workspace.get("counters"), 0, 1)?[0];
         Ok(State {
             step: self.step,
             rays: counters.rays,
             step_excess: counters.step_excess,
-            buffers,
-            occupancy_bits: self.workspace.read(&self.gpu, "occupancy_bits", self.plan.cell_count() / 32)?,
+            arrays: self.field.arrays()?,
         })
-    }
-
-    /// Number of floats of a part of the state.
-    fn state_length(&self, name: &str) -> usize {
-        let layout = &self.plan.layout;
-        match name {
-            "table" => layout.entries * FEATURES,
-            "table_moments" => layout.entries * FEATURES * 2,
-            "occupancy" => self.plan.cell_count(),
-            _ => layout.quads * 4,
-        }
     }
 
     /// One step: refresh the occupancy grid when it is due, then rays → march → density → select → colour →
@@ -197,19 +167,19 @@ impl Trainer {
     /// # Errors
     /// When the device reported an error.
     pub fn step(&mut self, learning_rate: f64, mut timer: Option<&mut Timer>) -> Result<()> {
-        let grid = &self.plan.config.occupancy;
+        let grid = &self.field.plan.config.occupancy;
         if self.step > 0 && self.step.is_multiple_of(grid.interval) {
             self.refresh_occupancy(timer.as_deref_mut())?;
         }
         self.step += 1;
-        let optimizer = &self.plan.config.optimizer;
+        let optimizer = &self.field.plan.config.optimizer;
         let step = Step { stream: self.stream(), ..Step::learning(optimizer, self.step, learning_rate) };
-        self.gpu.write(self.workspace.get("step"), 0, &[step]);
-        self.gpu.run("step", &self.stages, timer.as_deref_mut());
+        self.field.gpu.write(self.workspace.get("step"), 0, &[step]);
+        self.field.gpu.run("step", &self.stages, timer.as_deref_mut());
         if let Some(timer) = timer {
-            timer.collect(&self.gpu, None)?;
+            timer.collect(&self.field.gpu, None)?;
         }
-        self.gpu.check()
+        self.field.gpu.check()
     }
 
     /// Steps taken.
@@ -221,16 +191,22 @@ impl Trainer {
     /// The device it trains on.
     #[must_use]
     pub fn gpu(&self) -> &Gpu {
-        &self.gpu
+        &self.field.gpu
     }
 
     /// The plan it was built from.
     #[must_use]
     pub fn plan(&self) -> &Plan {
-        &self.plan
+        &self.field.plan
     }
 
-    /// The buffers, for rendering and for checks.
+    /// The field in training: a renderer of it shows it as it is then.
+    #[must_use]
+    pub fn field(&self) -> &Field {
+        &self.field
+    }
+
+    /// The buffers, for checks.
     #[must_use]
     pub fn workspace(&self) -> &Workspace {
         &self.workspace
@@ -242,9 +218,9 @@ impl Trainer {
     /// When the device was lost.
     pub fn report(&mut self) -> Result<StepStats> {
         let buffer = self.workspace.get("counters");
-        let counters = self.gpu.read::<Counters>(buffer, 0, 1)?[0];
+        let counters = self.field.gpu.read::<Counters>(buffer, 0, 1)?[0];
         let sums = std::mem::offset_of!(Counters, sum_steps) / size_of::<u32>();
-        self.gpu.write(buffer, sums, &vec![0u32; size_of::<Counters>() / size_of::<u32>() - sums]);
+        self.field.gpu.write(buffer, sums, &vec![0u32; size_of::<Counters>() / size_of::<u32>() - sums]);
         let used = f64::from(counters.sum_steps.saturating_sub(counters.sum_skipped).max(1));
         Ok(StepStats {
             steps: counters.sum_steps,
@@ -259,17 +235,17 @@ impl Trainer {
 
     /// Start of this step's random numbers.
     fn stream(&self) -> u32 {
-        pcg(self.step.wrapping_add(pcg(self.plan.config.seed)))
+        pcg(self.step.wrapping_add(pcg(self.field.plan.config.seed)))
     }
 
     /// Visits every so many-th cell in turn.
     fn refresh_occupancy(&mut self, mut timer: Option<&mut Timer>) -> Result<()> {
-        let grid = &self.plan.config.occupancy;
-        let marched = self.plan.target_samples() as f64 * f64::from(grid.interval);
+        let grid = &self.field.plan.config.occupancy;
+        let marched = self.field.plan.target_samples() as f64 * f64::from(grid.interval);
         let stride = (f64::from(self.visible_cells) / (grid.share * marched).max(1.0)).ceil().max(1.0) as u32;
         let first = (self.step / grid.interval) % stride;
         let cells = self.visible_cells.saturating_sub(first).div_ceil(stride);
-        let most = self.plan.config.batch.samples as u32;
+        let most = self.field.plan.capacity.samples as u32;
         for begin in (0..cells).step_by(most as usize) {
             let count = most.min(cells - begin);
             let step = Step {
@@ -279,25 +255,26 @@ impl Trainer {
                 cell_count: count,
                 ..Step::default()
             };
-            self.gpu.write(self.workspace.get("step"), 0, &[step]);
-            self.gpu.run(OCCUPANCY, self.occupancy.chunk(count as usize), timer.as_deref_mut());
+            self.field.gpu.write(self.workspace.get("step"), 0, &[step]);
+            self.field.gpu.run(OCCUPANCY, self.occupancy.chunk(count as usize), timer.as_deref_mut());
             if let Some(timer) = timer.as_deref_mut() {
-                timer.collect(&self.gpu, Some(OCCUPANCY))?;
+                timer.collect(&self.field.gpu, Some(OCCUPANCY))?;
             }
         }
-        self.gpu.run(OCCUPANCY, self.occupancy.bits(), timer.as_deref_mut());
-        timer.map_or(Ok(()), |timer| timer.collect(&self.gpu, Some(OCCUPANCY)))
+        self.field.gpu.run(OCCUPANCY, self.occupancy.bits(), timer.as_deref_mut());
+        timer.map_or(Ok(()), |timer| timer.collect(&self.field.gpu, Some(OCCUPANCY)))
     }
 }
 
-fn step_stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
-    let mut stages = vec![training::rays(gpu, plan, workspace)?];
+/// The stages of a step that draws from `cameras` cameras.
+fn step_stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, cameras: usize) -> Result<Vec<Stage>> {
+    let mut stages = vec![rays::stage(gpu, plan, workspace, cameras)?];
     stages.extend(march::stages(gpu, plan, workspace, true)?);
     stages.extend(density::stages(gpu, plan, workspace)?);
     stages.extend(color::stages(gpu, plan, workspace, color::Selection::Training)?);
-    stages.push(training::composite(gpu, plan, workspace, false)?);
-    stages.extend(training::backward(gpu, plan, workspace)?);
-    stages.extend(training::weight_gradients(gpu, plan, workspace)?);
-    stages.extend(training::update(gpu, plan, workspace)?);
+    stages.push(composite::stage(gpu, plan, workspace, false)?);
+    stages.extend(backward::stages(gpu, plan, workspace)?);
+    stages.extend(backward::weights(gpu, plan, workspace)?);
+    stages.extend(optimize::stages(gpu, plan, workspace)?);
     Ok(stages)
 }

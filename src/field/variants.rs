@@ -44,12 +44,12 @@ fn has_depth(plan: &Plan) -> bool {
 
 pub(super) static SLOTS: &[Slot] = &[
     slot(
-        "stepping",
+        "space",
         &[
-            told(when("cone", |plan| plan.needs.cascades > 1), "cascades and growing steps", |_| {
+            told(when("cascades", |plan| !plan.space.is_bounded()), "cascades and growing steps", |_| {
                 Some("the scene is bounded")
             }),
-            otherwise("uniform"),
+            otherwise("cube"),
         ],
     ),
     slot(
@@ -79,10 +79,7 @@ pub(super) static SLOTS: &[Slot] = &[
         "depth_loss",
         &[told(when("squared", has_depth), "depth", |_| Some("loss.depth is 0")), otherwise("none")],
     ),
-    slot(
-        "distance",
-        &[when("along", |plan| plan.needs.depth || plan.config.loss.distortion > 0.0), otherwise("none")],
-    ),
+    slot("distance", &[when("along", Plan::needs_distances), otherwise("none")]),
     slot(
         "distortion",
         &[

@@ -1,6 +1,6 @@
 //! The training views on their way to the device: cameras, photos, and what their silhouettes tell.
 
-use crate::camera::Bounds;
+use super::Space;
 use crate::camera::Camera;
 use crate::capture::dataset::nothing_counts;
 use crate::field::records::{self, Record, Units};
@@ -16,7 +16,7 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Views {
     pub(crate) cameras: Vec<Camera>,
-    pub(crate) bounds: Bounds,
+    pub(crate) space: Space,
     /// One per photo that was added.
     pub(crate) silhouettes: Vec<Silhouette>,
     /// In box space; one per photo of which a pixel can be drawn.
@@ -34,21 +34,15 @@ impl Views {
     ///
     /// # Errors
     /// When the adapter cannot hold them.
-    pub fn new(gpu: &Arc<Gpu>, plan: &Plan, cameras: &[Camera], bounds: &Bounds) -> Result<Self> {
-        Self::within(gpu, plan, cameras, bounds, Capacity::of(&gpu.device.limits(), plan.memory))
+    pub fn new(gpu: &Arc<Gpu>, plan: &Plan, cameras: &[Camera]) -> Result<Self> {
+        Self::within(gpu, plan, cameras, Capacity::of(&gpu.device.limits(), plan.memory))
     }
 
     /// As [`Views::new`], divided as `capacity` says.
     ///
     /// # Errors
     /// As [`Views::new`].
-    pub fn within(
-        gpu: &Arc<Gpu>,
-        plan: &Plan,
-        cameras: &[Camera],
-        bounds: &Bounds,
-        capacity: Capacity,
-    ) -> Result<Self> {
+    pub fn within(gpu: &Arc<Gpu>, plan: &Plan, cameras: &[Camera], capacity: Capacity) -> Result<Self> {
         let record = plan.record();
         let pixels = |camera: &Camera| camera.width as usize * camera.height as usize;
         let rows = cameras.iter().map(|camera| record.rows(pixels(camera))).sum();
@@ -61,13 +55,13 @@ impl Views {
             .context("use --downscale 2, --crop or --max-images N to train on fewer pixels")?;
         Ok(Self {
             cameras: cameras.to_vec(),
-            bounds: bounds.clone(),
+            space: plan.space,
             silhouettes: Vec::with_capacity(cameras.len()),
             on_device: Vec::with_capacity(cameras.len()),
             banks,
             gpu: Arc::clone(gpu),
             record,
-            units: Units { color: 1.0 / plan.needs.grey, depth: (0.5 / bounds.half) as f32 },
+            units: Units { color: 1.0 / plan.needs.grey, depth: plan.space.cubes_per_world() as f32 },
             row: 0,
         })
     }
@@ -94,7 +88,7 @@ impl Views {
         let pixel_count = (records.len() / self.record.words()) as u32;
         if pixel_count > 0 {
             let first_row = self.row as u32;
-            let camera = field::Camera::in_box(camera, &self.bounds);
+            let camera = field::Camera::in_box(camera, &self.space);
             self.on_device.push(field::Camera { first_row, pixel_count, ..camera });
         }
         self.row += rows_of(records.len());

@@ -3,8 +3,8 @@
 //! Leaving them out from the start saves the first steps of a training, which would otherwise fill the box
 //! with fog and dissolve it again.
 
+use super::Space;
 use super::silhouette::Silhouette;
-use crate::camera::Bounds;
 use crate::camera::{Camera, Lens};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -30,27 +30,15 @@ enum Sight {
 /// `true` for each cell (of `cells`³ per cascade, inner cascade first, x fastest) that no camera sees or that
 /// the alpha of several images shows to be empty.
 #[must_use]
-pub fn hidden_cells(
-    cameras: &[Camera],
-    silhouettes: &[Silhouette],
-    bounds: &Bounds,
-    cells: u32,
-) -> Vec<bool> {
+pub fn hidden_cells(cameras: &[Camera], silhouettes: &[Silhouette], space: &Space, cells: u32) -> Vec<bool> {
     let views: Vec<_> =
         cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
     let carves = views.iter().any(|view| !view.silhouette.is_opaque());
-    let per_cascade = cells.pow(3);
-    (0..per_cascade * bounds.cascades)
+    let count: usize = space.grid_shape(cells).iter().product();
+    (0..count as u32)
         .into_par_iter()
         .map(|index| {
-            let side = 2.0 * bounds.half * f64::from(1u32 << (index / per_cascade)) / f64::from(cells);
-            let within = index % per_cascade;
-            let corner = DVec3::new(
-                f64::from(within % cells),
-                f64::from(within / cells % cells),
-                f64::from(within / (cells * cells)),
-            );
-            let center = bounds.center + (corner + 0.5 - f64::from(cells) / 2.0) * side;
+            let (center, side) = space.cell(index, cells);
             is_hidden(&views, carves, center, side)
         })
         .collect()
@@ -141,6 +129,7 @@ fn half_angle(camera: &Camera) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Bounds;
     use crate::photo::{Image, Pixels};
     use glam::{DAffine3, DMat3};
 
@@ -173,6 +162,7 @@ mod tests {
     #[test]
     fn cells_on_rays_are_seen_through_every_lens() {
         let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades: 1, source: String::new() };
+        let space = Space::from(&bounds);
         let cells = 16;
         for lens in [
             Lens::Pinhole,
@@ -190,7 +180,7 @@ mod tests {
             let views = [camera.clone(), camera.clone(), camera.clone()];
             let silhouette = Silhouette::of(&image.into());
             let silhouettes = [silhouette.clone(), silhouette.clone(), silhouette];
-            let hidden = hidden_cells(&views, &silhouettes, &bounds, cells);
+            let hidden = hidden_cells(&views, &silhouettes, &space, cells);
             for index in (0..SIZE * SIZE).filter(|i| opaque(i % SIZE, i / SIZE)) {
                 let pixel = DVec2::new(f64::from(index % SIZE) + 0.5, f64::from(index / SIZE) + 0.5);
                 let Some(ray) = camera.ray(pixel) else { continue };

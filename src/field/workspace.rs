@@ -1,6 +1,8 @@
 //! Buffers and tensors by name.
 
+use super::Plan;
 use super::link::group_size;
+use super::parameters::{Array, Numbers};
 use crate::gpu::Gpu;
 use crate::gpu::banks::Banks;
 use crate::gpu::buffer::Buffer;
@@ -110,10 +112,55 @@ impl Workspace {
         }
     }
 
-    /// Shares a buffer or a tensor of `other`.
-    pub fn share(&mut self, other: &Self, name: &str) {
-        self.buffers.extend(other.buffers.iter().find(|buffer| buffer.name == name).cloned());
-        self.tensors.extend(other.tensors.iter().find(|tensor| tensor.name == name).cloned());
+    /// The numbers of the plan's arrays.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn arrays(&self, gpu: &Gpu, plan: &Plan) -> Result<Vec<(&'static str, Numbers)>> {
+        let numbers = |array: Array| {
+            let (name, count) = (array.name, array.count());
+            Ok((
+                name,
+                match array.has_words() {
+                    true => Numbers::Words(self.read(gpu, name, count)?),
+                    false => Numbers::Floats(self.read(gpu, name, count)?),
+                },
+            ))
+        };
+        plan.arrays().map(numbers).collect()
+    }
+
+    /// Sets those of the plan's arrays that are here.
+    ///
+    /// # Errors
+    /// When one is missing, or of another size.
+    pub fn set_arrays(&self, gpu: &Gpu, plan: &Plan, arrays: &[(&'static str, Numbers)]) -> Result<()> {
+        for array in plan.arrays() {
+            let (name, expected) = (array.name, array.count());
+            let numbers = arrays.iter().find(|(own, _)| *own == name).map(|(_, numbers)| numbers);
+            let found = numbers.map_or(0, Numbers::count);
+            ensure!(
+                found == expected,
+                "the state's '{name}' has {found} numbers, and this configuration needs {expected}"
+            );
+            match numbers.filter(|_| self.has(name)) {
+                Some(Numbers::Floats(numbers)) => self.write(gpu, name, numbers),
+                Some(Numbers::Words(numbers)) => self.write(gpu, name, numbers),
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether there is a buffer or a tensor of this name.
+    fn has(&self, name: &str) -> bool {
+        self.find(name).is_some() || self.tensors.iter().any(|tensor| tensor.name == name)
+    }
+
+    /// Shares the buffers and tensors of `other`.
+    pub fn share(&mut self, other: &Self) {
+        self.buffers.extend(other.buffers.iter().cloned());
+        self.tensors.extend(other.tensors.iter().cloned());
     }
 
     /// Binds `kernel` to what it uses; `renamed` pairs a WGSL name with the name here.

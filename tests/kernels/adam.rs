@@ -16,7 +16,7 @@ fn nothing_to_divide_by() -> Result<()> {
     setup.config.optimizer.beta_2 = 0.99;
     setup.config.optimizer.l2 = 1e-3;
     let bench = workbench(setup)?;
-    let stages = training::update(&bench.gpu, &bench.plan, &bench.workspace)?;
+    let stages = optimize::stages(&bench.gpu, &bench.plan, &bench.workspace)?;
     let quads = bench.plan.layout.quads;
     let start: Vec<f32> = (0..quads * 4).map(|i| if i % 2 == 0 { 0.0 } else { 1.0 }).collect();
     bench.write("mlp", &start);

@@ -4,7 +4,7 @@ use super::medium::Samples;
 use anyhow::{Context, Result, ensure};
 use glam::DVec3;
 use nerf::config;
-use nerf::field::{color, training};
+use nerf::field::{color, composite};
 use nerf::gpu::Gpu;
 use nerf::gpu::pass::Stage;
 use nerf::gpu::timer::Timer;
@@ -178,7 +178,7 @@ fn stages(bench: &Workbench, variant: Variant) -> Result<Vec<Stage>> {
     let mut stages = color::stages(&bench.gpu, &plan, &bench.workspace, color::Selection::Training)?;
     stages.retain(|stage| SELECTING.contains(&stage.bound.label.as_str()));
     ensure!(stages.len() == SELECTING.len(), "selection has {} of the stages {SELECTING:?}", stages.len());
-    stages.push(training::composite(&bench.gpu, &plan, &bench.workspace, false)?);
+    stages.push(composite::stage(&bench.gpu, &plan, &bench.workspace, false)?);
     Ok(stages)
 }
 

@@ -14,6 +14,7 @@ use anyhow::{Context, Result, ensure};
 use curve::{Curve, follow};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::config::schedule::Budget;
+use nerf::field::Field;
 use nerf::field::train::Trainer;
 use nerf::gpu::Gpu;
 use nerf::support::file::writable_folder;
@@ -138,9 +139,9 @@ impl Course<'_> {
         let views = photos::load(setup, self.dataset, &self.gpu, session.remarks)?;
         let load_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let mut trainer = Trainer::new(&self.gpu, setup.plan.clone(), views)?;
+        let mut trainer = Trainer::new(Field::new(&self.gpu, setup.plan.clone())?, views)?;
         trainer.warm_up()?;
-        let mut exam = Exam::new(&self.gpu, setup, trainer.workspace(), self.dataset, self.views)?
+        let mut exam = Exam::new(setup, trainer.field(), self.dataset, self.views)?
             .context("the dataset has no test views")?;
         let compile_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();

@@ -9,8 +9,8 @@ use nerf::camera::Camera;
 use nerf::capture::dataset::Dataset;
 use nerf::capture::health::Finding;
 use nerf::config::Config;
-use nerf::field::parameters::{Layout, finest_resolution};
-use nerf::field::{Needs, Plan, Traits};
+use nerf::field::layout::finest_resolution;
+use nerf::field::{Needs, Plan, Space, Traits};
 use nerf::gpu::banks::Capacity;
 use nerf::run::memory::Memory;
 
@@ -69,7 +69,7 @@ impl Estimate {
 }
 
 fn plan(traits: Traits, mut config: Config, needs: Needs, bounds: &Bounds, cameras: &[Camera]) -> Plan {
-    config.grid.finest = finest_resolution(&config.grid, bounds, cameras);
-    let layout = Layout::new(&config, config.grid.finest);
-    Plan::suited_to(traits, config, layout, needs)
+    let space = Space::from(bounds);
+    config.grid.finest = finest_resolution(&config.grid, &space, cameras);
+    Plan::suited_to(traits, config, needs, space)
 }

@@ -28,8 +28,6 @@ pub(in crate::commands) fn of_headers(dataset: &Dataset, config: &Config) -> Res
         lenses: LensKind::among(used.map(|&index| &dataset.frames[index].camera)),
         hdr: dataset.is_hdr,
         grey: 1.0,
-        cascades: dataset.bounds.cascades,
-        cameras: dataset.train.len(),
         ..Needs::default()
     };
     for_photos(needs, dataset, &dataset.train, config)

@@ -31,7 +31,7 @@ pub(in crate::commands) fn load(
     gpu: &Arc<Gpu>,
     remarks: Remarks,
 ) -> Result<Views> {
-    let mut views = Views::new(gpu, &setup.plan, &setup.cameras, &setup.about.bounds)?;
+    let mut views = Views::new(gpu, &setup.plan, &setup.cameras)?;
     let progress = Progress::new(remarks, "loading");
     let mut ignored = Vec::new();
     dataset.stream(&setup.train, setup.plan.needs.depth, &mut |position, photo| {

@@ -10,11 +10,12 @@ use nerf::camera::orbit::Orbit;
 use nerf::capture::dataset::Dataset;
 use nerf::config::schedule::Budget;
 use nerf::config::{Background, Config};
-use nerf::field::Plan;
 use nerf::field::checkpoint::{About, Checkpoint, FORMAT, Splits};
-use nerf::field::parameters::finest_resolution;
+use nerf::field::layout::Layout;
+use nerf::field::layout::finest_resolution;
+use nerf::field::optimize::accumulation_name;
 use nerf::field::train::State;
-use nerf::field::training::accumulation_name;
+use nerf::field::{Plan, Space, Traits};
 use nerf::gpu::Gpu;
 use nerf::photo::Reading;
 use nerf::support::format::{count, few};
@@ -88,7 +89,7 @@ impl Setup {
             "a deterministic training needs --steps N and no --seconds: how many steps fit into a time differs from \
              run to run"
         );
-        let plan = Plan::new(gpu, about.config.clone(), about.layout(), about.needs.clone());
+        let plan = about.plan(Traits::of(gpu));
         let cameras = cameras(dataset, &train);
         Ok(Self { about, plan, state, train, test, cameras })
     }
@@ -152,7 +153,7 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
     let defaults = defaults(gpu.is_cpu(), dataset)?;
     let mut config = configure(defaults, wishes)?;
     let cameras = cameras(dataset, &dataset.train);
-    config.grid.finest = finest_resolution(&config.grid, &bounds, &cameras);
+    config.grid.finest = finest_resolution(&config.grid, &Space::from(&bounds), &cameras);
     let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
     let orbit = Orbit::of(&cameras, bounds.center);
     let needs = needs::of(dataset, &config)?;
@@ -179,13 +180,13 @@ fn first(wishes: &Wishes<'_>, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
 /// The description of an earlier training with what the command line changes; the field's size stays.
 fn again(wishes: &Wishes<'_>, mut about: About, dataset: &Dataset, train: &[usize]) -> Result<About> {
     let config = configure(about.config.clone(), wishes)?;
-    let changed = About { config, ..about.clone() };
     ensure!(
-        changed.layout() == about.layout() && changed.config.occupancy.cells == about.config.occupancy.cells,
+        Layout::new(&config) == Layout::new(&about.config)
+            && config.occupancy.cells == about.config.occupancy.cells,
         "a training cannot change its grid, network or occupancy grid on --resume; leave those settings out, or \
          start anew with --overwrite"
     );
-    about.config = changed.config;
+    about.config = config;
     about.needs = needs::for_photos(about.needs, dataset, train, &about.config)?;
     Ok(about)
 }

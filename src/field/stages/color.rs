@@ -1,8 +1,8 @@
 //! Choosing the samples that matter, and the colour network over them.
 
 use crate::field::density::{forward, layer_stage};
-use crate::field::march::{SPARE_ROWS, Scanned, kept_capacity, scan};
-use crate::field::parameters::COLOR_INPUTS;
+use crate::field::layout::COLOR_INPUTS;
+use crate::field::march::{SPARE_ROWS, Scanned, scan};
 use crate::field::{Link, Plan, Workspace, dispatch, viewing};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
@@ -24,9 +24,9 @@ pub enum Selection {
 
 /// The kept samples and the colour network's activations.
 pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
-    let rows = kept_capacity(&plan.config.batch) + SPARE_ROWS;
+    let rows = plan.capacity.kept + SPARE_ROWS;
     let mut demands = vec![
-        plan.tensor("chosen", Element::Vec4, plan.config.batch.samples),
+        plan.tensor("chosen", Element::Vec4, plan.capacity.samples),
         plan.tensor("kept_rows", Element::Pair, rows),
         plan.tensor("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
         plan.tensor("color", Element::Vec4, rows),

@@ -1,7 +1,7 @@
 //! The density network over all marched samples: encoding and two layers.
 
+use crate::field::layout::{DENSITY_OUTPUTS, Layer};
 use crate::field::march::SPARE_ROWS;
-use crate::field::parameters::{DENSITY_OUTPUTS, Layer, Level};
 use crate::field::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
@@ -13,33 +13,12 @@ use anyhow::Result;
 
 /// The activations of the marched samples.
 pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
-    let rows = plan.config.batch.samples + SPARE_ROWS;
+    let rows = plan.capacity.samples + SPARE_ROWS;
     vec![
         plan.tensor("encoding", Element::Vec4, rows * plan.layout.encoding() / 4),
         plan.tensor("density_hidden", Element::Vec4, rows * plan.config.network.width / 4),
         plan.tensor("density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
     ]
-}
-
-/// The parameters: table, weights, occupancy and the levels' description.
-pub(crate) fn parameter_demands(plan: &Plan) -> Vec<Demand> {
-    vec![
-        Demand::uniform_storage::<Level>("levels", plan.layout.levels.len()),
-        Demand::uniform_storage::<[f32; 4]>("mlp", plan.layout.quads),
-        Demand::storage::<f32>("occupancy", plan.cell_count()),
-        plan.tensor("table", Element::Vec2, plan.layout.entries),
-        plan.tensor("occupancy_bits", Element::Word, plan.cell_count() / 32),
-    ]
-}
-
-/// Allocates the parameters and describes the levels.
-///
-/// # Errors
-/// When the adapter cannot hold them.
-pub fn allocate_parameters(gpu: &Gpu, plan: &Plan, workspace: &mut Workspace) -> Result<()> {
-    workspace.allocate(gpu, &parameter_demands(plan))?;
-    workspace.write(gpu, "levels", &plan.layout.levels);
-    Ok(())
 }
 
 /// Encodes the samples and runs the density network on them.

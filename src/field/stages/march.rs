@@ -1,7 +1,6 @@
 //! From rays to samples: marching through the occupancy grid, and the scan that packs the samples.
 
-use crate::config::Batch;
-use crate::field::{Counters, Link, Plan, Step, Workspace, dispatch};
+use crate::field::{Capacity, Counters, Link, Plan, Step, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
@@ -13,16 +12,16 @@ pub const SPARE_ROWS: usize = 1024;
 
 /// Rays, their spans and the samples.
 pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
-    let batch = &plan.config.batch;
+    let Capacity { rays, samples, .. } = plan.capacity;
     vec![
         Demand::uniform::<Step>("step"),
         Demand::uniform_storage::<Counters>("counters", 1),
         Demand::indirect("dispatch", dispatch::COUNT * 4),
-        Demand::storage::<u32>("ray_steps", batch.rays * plan.step_words()),
-        Demand::storage::<[u32; 2]>("ray_spans", batch.rays),
-        Demand::storage::<[u32; 2]>("kept_spans", batch.rays),
-        plan.tensor("ray_lines", Element::Vec4, 2 * batch.rays),
-        plan.tensor("samples", Element::Vec4, batch.samples + SPARE_ROWS),
+        Demand::storage::<u32>("ray_steps", rays * plan.step_words()),
+        Demand::storage::<[u32; 2]>("ray_spans", rays),
+        Demand::storage::<[u32; 2]>("kept_spans", rays),
+        plan.tensor("ray_lines", Element::Vec4, 2 * rays),
+        plan.tensor("samples", Element::Vec4, samples + SPARE_ROWS),
     ]
 }
 
@@ -67,6 +66,7 @@ pub fn stages_over(
     let jitter = if jitter { "on" } else { "off" };
     let over_rays = |label: &str| {
         let link = Link::of(label).with("jitter", jitter).with("extent", extent.variant());
+        let link = if extent == Extent::Round { link.with("distance", "depth") } else { link };
         plan.stage(gpu, workspace, &link, dispatch::RAYS)
     };
     Ok(vec![over_rays("march")?, scan(gpu, plan, workspace, Scanned::Samples)?, over_rays("samples")?])
@@ -88,21 +88,14 @@ pub enum Scanned {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn scan(gpu: &Gpu, plan: &Plan, workspace: &Workspace, scanned: Scanned) -> Result<Stage> {
-    let batch = &plan.config.batch;
+    let Capacity { rays, samples, kept } = plan.capacity;
     let (variant, capacity, spans) = match scanned {
-        Scanned::Samples => ("samples", batch.samples, "ray_spans"),
-        Scanned::Kept => ("kept", kept_capacity(batch), "kept_spans"),
-        Scanned::Free => ("free", batch.rays, "view_slots"),
+        Scanned::Samples => ("samples", samples, "ray_spans"),
+        Scanned::Kept => ("kept", kept, "kept_spans"),
+        Scanned::Free => ("free", rays, "view_slots"),
     };
     let link = Link::of_file(&format!("scan {variant}"), "scan");
     let link = link.with("scanned", variant).with("counted", "written").count("CAPACITY", capacity);
     let kernel = plan.kernel(gpu, &link)?;
     Ok(Stage::single(workspace.bind(gpu, &kernel, &[("ray_spans", spans)])?))
-}
-
-/// Most kept samples of a step: half as much again as the target, since the number of rays follows it only
-/// from step to step.
-#[must_use]
-pub fn kept_capacity(batch: &Batch) -> usize {
-    (batch.kept / 2 * 3).min(batch.samples)
 }

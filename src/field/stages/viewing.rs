@@ -49,13 +49,14 @@ impl Rounds {
 /// The camera, the state of the rays and the pixels of a band.
 #[must_use]
 pub fn demands(plan: &Plan) -> Vec<Demand> {
-    let (rays, band) = (plan.config.batch.rays, plan.rounds.band);
+    let (rays, band) = (plan.capacity.rays, plan.rounds.band);
     vec![
         Demand::uniform::<Camera>("view_camera"),
         Demand::uniform_storage::<Progress>("progress", 1),
         Demand::storage::<[u32; 2]>("view_slots", rays),
         Demand::storage::<[u32; 3]>("view_rays", rays),
         plan.tensor("ray_states", Element::Vec4, 2 * rays),
+        Demand::storage::<f32>("sample_distances", plan.capacity.samples),
         Demand::storage::<Pixel>("view_pixels", band),
     ]
 }
@@ -73,7 +74,7 @@ pub fn rays(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 /// # Errors
 /// When the kernel cannot be built.
 pub(crate) fn select(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
-    plan.stage(gpu, workspace, &Link::of("view select"), dispatch::RAYS)
+    plan.stage(gpu, workspace, &Link::of("view select").with("distance", "depth"), dispatch::RAYS)
 }
 
 /// Adds their colours, and writes the pixels of rays that ended.

@@ -3,7 +3,7 @@
 use super::draw::{Random, quiet_step};
 use super::tally::largest;
 use super::{Setup, Subject, Tally, Workbench};
-use crate::field::{Counters, Step, training};
+use crate::field::{Counters, Step, optimize};
 use crate::verify::reference::adam::{Adam, Moments, Schedule};
 use anyhow::Result;
 
@@ -53,7 +53,7 @@ fn gradients(random: &mut Random, step: u32, count: usize) -> Vec<f32> {
 
 fn table(bench: &Workbench) -> Result<Tally> {
     let mut tally = Tally::new("Adam: table", 3e-6, "four roundings per step and moment, six steps");
-    let stages = training::update(&bench.gpu, &bench.plan, &bench.workspace)?;
+    let stages = optimize::stages(&bench.gpu, &bench.plan, &bench.workspace)?;
     let mut random = Random::new(70);
     let count = bench.plan.layout.entries * 2;
     let start = random.numbers(count, -1.0, 1.0);
@@ -84,7 +84,7 @@ fn table(bench: &Workbench) -> Result<Tally> {
 fn networks(bench: &Workbench) -> Result<Tally> {
     let mut tally =
         Tally::new("Adam: networks", 5e-6, "sums of 32 chunks and four roundings per step, six steps");
-    let stages = training::update(&bench.gpu, &bench.plan, &bench.workspace)?;
+    let stages = optimize::stages(&bench.gpu, &bench.plan, &bench.workspace)?;
     let mut random = Random::new(71);
     bench.randomise(&mut random, 1.0, 1.0)?;
     let quads = bench.plan.layout.quads;

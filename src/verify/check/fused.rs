@@ -4,7 +4,7 @@ use super::draw::Random;
 use super::hard_rays::HardRay;
 use super::thinned::thinned_rays;
 use super::{Setup, Subject, Tally, Workbench};
-use crate::field::{Counters, training};
+use crate::field::{Counters, composite};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::Transmittance;
 use crate::verify::reference::composite::{CompositeInput, CompositeOutput};
@@ -45,7 +45,7 @@ impl Fused {
         setup.config.batch.rays = RAYS;
         let context = || format!("the longest ray has {longest} samples");
         let bench = subject.workbench(setup).with_context(context)?;
-        let stage = training::composite(&bench.gpu, &bench.plan, &bench.workspace, true)?;
+        let stage = composite::stage(&bench.gpu, &bench.plan, &bench.workspace, true)?;
         Ok(Self { bench, stage, samples })
     }
 

@@ -3,7 +3,7 @@
 use super::draw::Random;
 use super::{Setup, Subject, Tally, Workbench};
 use crate::field::density;
-use crate::field::parameters::FEATURES;
+use crate::field::layout::FEATURES;
 use crate::gpu::pass::Stage;
 use crate::verify::reference::grid::grid_encode;
 use crate::verify::reference::model::{RaySample, TrainingRay};
@@ -18,7 +18,9 @@ pub fn features(subject: &Subject) -> Result<Tally> {
     let mut tally =
         Tally::new("hash grid: features", 3.6e-7, "a position in cells rounds to half a unit per axis");
     for finest in [40, 2048] {
-        let bench = subject.workbench(Setup { finest, ..Setup::tiny() })?;
+        let mut setup = Setup::tiny();
+        setup.config.grid.finest = finest;
+        let bench = subject.workbench(setup)?;
         let mut random = Random::new(10);
         let table = random.numbers(bench.plan.layout.entries * FEATURES, -1.0, 1.0);
         bench.set_table(&table);

@@ -2,7 +2,7 @@
 
 use super::draw::Random;
 use super::{Setup, Subject, Tally};
-use crate::field::parameters::{COLOR_INPUTS, DENSITY_OUTPUTS};
+use crate::field::layout::{COLOR_INPUTS, DENSITY_OUTPUTS};
 use crate::field::{Counters, color, dispatch};
 use crate::verify::reference::harmonics::harmonics as reference;
 use anyhow::Result;

@@ -4,7 +4,7 @@ use super::draw::Random;
 use super::workbench::KeptStep;
 use super::{Setup, Subject, Tally};
 use crate::config::{ColorLoss, Loss};
-use crate::field::{Counters, training};
+use crate::field::{Counters, composite};
 use crate::verify::reference::Transmittance;
 use crate::verify::reference::composite::{CompositeInput, CompositeOutput, optical_depths};
 use crate::verify::reference::loss::{Places, SPARSE_DENSITY, composite_with, distortion};
@@ -84,7 +84,7 @@ impl Case {
                 })
                 .collect();
             upload(&bench, &rays, &spans);
-            bench.run([&training::composite(&bench.gpu, &bench.plan, &bench.workspace, true)?])?;
+            bench.run([&composite::stage(&bench.gpu, &bench.plan, &bench.workspace, true)?])?;
             let gradients: Vec<[f32; 4]> = bench.read("d_color", first as usize)?;
             let results = bench.results(rays.len())?;
             for (number, (ray, [first, count])) in rays.iter().zip(spans).enumerate() {

@@ -3,7 +3,7 @@
 use super::draw::{Random, uniform};
 use super::rays::{drawn, pixel_camera};
 use super::{Setup, Subject, Tally, Workbench};
-use crate::field::{Counters, dimension, march, training};
+use crate::field::{Counters, dimension, march, rays};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::march::{BoxRay, March, MarchSample, box_interval};
 use crate::verify::reference::occupancy::{OccupancyShape, is_set};
@@ -55,8 +55,7 @@ pub fn marched_samples(subject: &Subject) -> Result<Vec<Tally>> {
         differing: 0,
     };
     for (cascades, step_excess) in [(1, 0.0), (3, 0.0), (1, 0.75), (3, 0.75), (3, 7.0)] {
-        let mut setup = Setup::tiny();
-        setup.needs.cascades = cascades;
+        let mut setup = Setup::tiny().cascades(cascades);
         setup.config.batch.samples = 16384;
         let mut marching = Marching::new(subject, setup)?;
         marching.step_excess = step_excess;
@@ -90,15 +89,14 @@ impl Marching {
     ///
     /// # Errors
     /// When the adapter cannot hold it or refuses a kernel.
-    pub fn new(subject: &Subject, mut setup: Setup) -> Result<Self> {
+    pub fn new(subject: &Subject, setup: Setup) -> Result<Self> {
         let rays = rays();
-        setup.needs.cameras = rays.len();
         let mut bench = subject.workbench(setup)?;
         let cameras: Vec<_> = rays.iter().map(|ray| pixel_camera(ray.origin, ray.direction)).collect();
         bench.workspace.add(bench.gpu.storage_with("cameras", &cameras)?);
         bench.add_photos(&[])?;
         let stages = |jitter| -> Result<Vec<Stage>> {
-            let mut stages = vec![training::rays(&bench.gpu, &bench.plan, &bench.workspace)?];
+            let mut stages = vec![rays::stage(&bench.gpu, &bench.plan, &bench.workspace, cameras.len())?];
             stages.extend(march::stages(&bench.gpu, &bench.plan, &bench.workspace, jitter)?);
             Ok(stages)
         };
@@ -154,13 +152,13 @@ impl Marching {
 
 /// The reference of a workbench's plan.
 pub(super) fn reference(bench: &Workbench) -> March {
-    let (config, cascades) = (&bench.plan.config, bench.plan.needs.cascades);
+    let (config, cascades) = (&bench.plan.config, bench.plan.space.cascades() as u32);
     March {
         shape: OccupancyShape { cascades, resolution: config.occupancy.cells },
         steps: config.march.steps,
         scale: 1.0,
         cone: config.march.cone,
-        near: config.march.near / bench.plan.density_scale(),
+        near: bench.plan.space.near(&config.march),
         max_steps: config.march.most_steps as u32,
     }
 }

@@ -20,8 +20,7 @@ pub fn occupancy_update(subject: &Subject) -> Result<Tally> {
         "e^s turns the rounding of a log-density of up to 15 into a relative one",
     );
     for (cascades, limit) in [(1, 0.01), (3, 1e6)] {
-        let mut setup = Setup::tiny();
-        setup.needs.cascades = cascades;
+        let mut setup = Setup::tiny().cascades(cascades);
         setup.config.batch.samples = 1000;
         setup.config.occupancy.threshold = limit;
         setup.config.occupancy.decay = 0.9;
@@ -68,18 +67,19 @@ fn visited(bench: &Workbench, update: &mut occupancy::Update, random: &mut Rando
 /// The reference's value of a cell after a visit.
 fn value_of(bench: &Workbench, model: &Model, cell: usize, old: f64) -> f64 {
     let plan = &bench.plan;
-    let shape = OccupancyShape { cascades: plan.needs.cascades, resolution: plan.config.occupancy.cells };
+    let shape =
+        OccupancyShape { cascades: plan.space.cascades() as u32, resolution: plan.config.occupancy.cells };
     let offset = [0, 1, 2].map(|axis| uniform(cell, dimension::CELL + axis));
     let position = shape.position(cell, DVec3::from_array(offset));
     let encoded = grid_encode(&model.levels, &model.table, position);
     let outputs = model.density.forward(&encoded).pop().unwrap_or_default();
     let raw = outputs.first().copied().unwrap_or(0.0);
-    visit(old, raw, plan.step_min() * plan.density_scale())
+    visit(old, raw, plan.least_step())
 }
 
 fn compare(tally: &mut Tally, bench: &Workbench, want: &[f64], limit: f64) -> Result<()> {
     let cells = want.len();
-    let cascades = bench.plan.needs.cascades;
+    let cascades = bench.plan.space.cascades();
     let got: Vec<f32> = bench.read("occupancy", cells)?;
     // Values of a tenth and more; those below are visited from a position whose rounding counts.
     let faded: Vec<f64> = want.iter().map(|&value| fade(value, bench.plan.config.occupancy.decay)).collect();

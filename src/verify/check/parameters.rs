@@ -3,7 +3,7 @@
 use super::Workbench;
 use super::draw::Random;
 use crate::config::{self, Accumulation};
-use crate::field::parameters::{FEATURES, Layer};
+use crate::field::layout::{FEATURES, Layer};
 use crate::verify::reference::grid::GridLevel;
 use crate::verify::reference::loss::Loss;
 use crate::verify::reference::mlp::{self, Mlp};

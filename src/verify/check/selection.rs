@@ -115,11 +115,14 @@ impl Selecting {
         (rays, raw): (&[TrainingRay], &[f32]),
     ) -> Result<()> {
         let plan = &self.bench.plan;
-        let shape = OccupancyShape { cascades: plan.needs.cascades, resolution: plan.config.occupancy.cells };
+        let shape = OccupancyShape {
+            cascades: plan.space.cascades() as u32,
+            resolution: plan.config.occupancy.cells,
+        };
         let mut want: Vec<f64> = first.iter().map(|&value| value.into()).collect();
         for (sample, &raw) in rays.iter().flat_map(|ray| &ray.samples).zip(raw) {
             let cell = &mut want[shape.cell(sample.position)];
-            *cell = visit(*cell, raw.into(), plan.step_min() * plan.density_scale());
+            *cell = visit(*cell, raw.into(), plan.least_step());
         }
         let got: Vec<f32> = self.bench.read("occupancy", want.len())?;
         tally.each("occupancy", &got, &want, |cell| want[cell].abs().max(1e-6));

@@ -1,16 +1,17 @@
 //! What a workbench is built from.
 
 use super::draw::SEED;
+use crate::camera::Bounds;
 use crate::config::{
     self, Accumulation, Batch, Config, Grid, March, Network, Occupancy, Optimizer, Selection,
 };
 use crate::field::layer::Product;
-use crate::field::parameters::Layout;
-use crate::field::{Needs, Plan};
+use crate::field::{Needs, Plan, Space};
 use crate::gpu::Gpu;
 use crate::gpu::tensor::Memory;
 use crate::verify::reference::Transmittance;
 use anyhow::Result;
+use glam::DVec3;
 
 /// What a [`super::Workbench`] is built from.
 #[derive(Clone, Debug)]
@@ -19,8 +20,8 @@ pub struct Setup {
     pub config: Config,
     /// What the scene needs.
     pub needs: Needs,
-    /// Cells per axis of the grid's finest level.
-    pub finest: u32,
+    /// The scene's box.
+    pub bounds: Bounds,
     /// How matrix products are written; `None` as the plan chooses.
     pub product: Option<Product>,
     /// Where tensors live; `None` as the plan chooses.
@@ -51,13 +52,21 @@ impl Setup {
             ..Config::default()
         };
         let needs = Needs { alpha: true, ..Needs::default() };
-        Self { config, needs, finest: 40, product: None, memory: None }
+        let bounds = Bounds { center: DVec3::splat(0.5), half: 0.5, cascades: 1, source: "unit cube".into() };
+        Self { config, needs, bounds, product: None, memory: None }
     }
 
     /// With hidden layers of `width`, `color_layers` of them in the colour network.
     #[must_use]
     pub fn network(mut self, width: usize, color_layers: usize) -> Self {
         self.config.network = Network { width, color_layers };
+        self
+    }
+
+    /// With this many cubes, the inner one the unit cube of the world.
+    #[must_use]
+    pub fn cascades(mut self, cascades: u32) -> Self {
+        self.bounds.cascades = cascades;
         self
     }
 
@@ -91,8 +100,8 @@ impl Setup {
     /// When the configuration is out of range.
     pub fn plan(&self, gpu: &Gpu) -> Result<Plan> {
         self.config.validate()?;
-        let layout = Layout::new(&self.config, self.finest);
-        let mut plan = Plan::new(gpu, self.config.clone(), layout, self.needs.clone());
+        let space = Space::from(&self.bounds);
+        let mut plan = Plan::new(gpu, self.config.clone(), self.needs.clone(), space);
         plan.product = self.product.unwrap_or(plan.product);
         plan.memory = self.memory.unwrap_or(plan.memory);
         Ok(plan)

@@ -3,13 +3,12 @@
 use super::draw::Random;
 use super::tally::largest;
 use super::{Setup, Subject, Tally, Workbench};
-use crate::camera::Bounds;
 use crate::camera::{Camera, Lens};
 use crate::config::{Background, Loss, Optimizer, Selection};
-use crate::field::parameters::DENSITY_OUTPUTS;
+use crate::field::layout::DENSITY_OUTPUTS;
 use crate::field::train::{StepStats, Trainer};
 use crate::field::views::Views;
-use crate::field::{Needs, RayTarget, STEP_GROWTH, STEP_SHRINKAGE};
+use crate::field::{Field, Needs, RayTarget, STEP_GROWTH, STEP_SHRINKAGE};
 use crate::photo::Photo;
 use crate::photo::{Image, Pixels};
 use crate::verify::reference::Transmittance;
@@ -40,8 +39,7 @@ pub struct TinyTraining {
 pub fn setups() -> [(&'static str, Setup); 5] {
     let mut random_background = Setup::tiny().network(32, 2);
     random_background.config.background = Background::Random;
-    let mut cascades = Setup::tiny().network(32, 1).hdr(true);
-    cascades.needs.cascades = 3;
+    let cascades = Setup::tiny().network(32, 1).hdr(true).cascades(3);
     let mut masks = Setup::tiny();
     masks.config.loss = Loss { depth: 0.3, distortion: 0.02, sparsity: 0.01, ..Loss::default() };
     (masks.needs.deep, masks.needs.masks, masks.needs.depth) = (true, true, true);
@@ -163,7 +161,6 @@ impl TinyTraining {
     pub fn new(subject: &Subject, setup: Setup) -> Result<Self> {
         let mut setup = subject.setup(setup);
         let cameras = cameras();
-        setup.needs.cameras = cameras.len();
         setup.config.optimizer = Optimizer::default();
         // High enough that every batch has light samples, of which some are dropped.
         setup.config.selection = Selection { weight_floor: 0.05, light_share: 0.5, stop_transmittance: 1e-4 };
@@ -172,13 +169,11 @@ impl TinyTraining {
         setup.config.batch.samples = 4096;
         let mut random = Random::new(80);
         let photos: Vec<_> = cameras.iter().map(|camera| photo(&mut random, camera, &setup.needs)).collect();
-        let cascades = setup.needs.cascades;
-        let bounds = Bounds { center: DVec3::splat(0.5), half: 0.5, cascades, source: String::new() };
         let plan = setup.plan(&subject.gpu)?;
-        let mut views = Views::new(&subject.gpu, &plan, &cameras, &bounds)?;
+        let mut views = Views::new(&subject.gpu, &plan, &cameras)?;
         photos.iter().try_for_each(|photo| views.add(photo))?;
-        let trainer = Trainer::new(&subject.gpu, plan.clone(), views)?;
-        let bench = Workbench::of(&subject.gpu, plan, trainer.workspace().clone())?;
+        let trainer = Trainer::new(Field::new(&subject.gpu, plan)?, views)?;
+        let bench = Workbench::of(trainer.field().clone(), trainer.workspace().clone())?;
         Ok(Self { trainer, bench })
     }
 
@@ -230,7 +225,7 @@ impl TinyTraining {
         let spans: Vec<[u32; 2]> = bench.read("ray_spans", rays)?;
         let directions = bench.rays(rays)?;
         let targets: Vec<RayTarget> = bench.read("ray_targets", rays)?;
-        let scale = bench.plan.density_scale();
+        let scale = bench.plan.space.cubes_per_box();
         let vector = |x: &[f32; 4]| DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
         let sample = |index: usize, ray: usize| {
             let position = vector(&samples[index]);

@@ -3,7 +3,7 @@
 use super::{Setup, Workbench};
 use crate::config::Accumulation;
 use crate::field::layer::Product;
-use crate::field::{Plan, Traits, training::accumulation_name};
+use crate::field::{Plan, Traits, optimize::accumulation_name};
 use crate::gpu::Gpu;
 use crate::gpu::tensor::Memory;
 use anyhow::{Result, ensure};

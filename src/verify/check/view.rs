@@ -46,14 +46,13 @@ pub fn rendered_views(subject: &Subject) -> Result<Vec<Tally>> {
         (1, false, Lens::Equirectangular, Transmittance::Exclusive),
     ];
     for (number, (cascades, hdr, lens, transmittance)) in scenes.into_iter().enumerate() {
-        let mut setup = Setup::tiny().network(32, 2).hdr(hdr).transmittance(transmittance);
-        setup.needs.cascades = cascades;
+        let mut setup = Setup::tiny().network(32, 2).hdr(hdr).transmittance(transmittance).cascades(cascades);
         setup.config.selection.stop_transmittance = STOP;
+        (setup.bounds.center, setup.bounds.half) = (DVec3::new(1.0, 2.0, 3.0), 0.75);
+        let bounds = setup.bounds.clone();
         let mut bench = subject.workbench(setup)?;
         bench.randomise(&mut Random::new(90), 2.0, 1.5)?;
         bench.write("occupancy_bits", &vec![u32::MAX; bench.plan.cell_count() / 32]);
-        let bounds =
-            Bounds { center: DVec3::new(1.0, 2.0, 3.0), half: 0.75, cascades, source: String::new() };
         let scene = Scene { camera: camera(&bounds, lens), bounds };
         scene.compare(&mut shared, &bench)?;
         bench.plan.rounds.color_weight = LEAST_WEIGHT;
@@ -97,7 +96,7 @@ impl Scene {
         let Self { bounds, camera } = self;
         // With cascades the lens is chosen among all, without it is the only one.
         let lenses = if bounds.cascades > 1 { LensKind::ALL.into() } else { LensKind::among([camera]) };
-        Renderer::new(&bench.gpu, &bench.plan, &bench.workspace, bounds, &lenses)?.render(camera)
+        Renderer::new(&bench.field.with_rounds(bench.plan.rounds), &lenses)?.render(camera)
     }
 
     fn name(&self) -> String {

@@ -2,9 +2,10 @@
 
 use super::Setup;
 use super::draw::quiet_step;
-use crate::field::parameters::DENSITY_OUTPUTS;
+use crate::field::layout::DENSITY_OUTPUTS;
 use crate::field::{
-    Counters, Plan, RayResult, RayTarget, Step, Workspace, color, density, dispatch, march, records, training,
+    Counters, Field, Plan, RayResult, RayTarget, Step, Workspace, backward, color, composite, density,
+    dispatch, march, optimize, records,
 };
 use crate::gpu::Gpu;
 use crate::gpu::banks::{Banks, Capacity, rows_of};
@@ -22,6 +23,8 @@ pub struct Workbench {
     pub gpu: Arc<Gpu>,
     /// How kernels are linked.
     pub plan: Plan,
+    /// The field.
+    pub field: Field,
     /// The buffers.
     pub workspace: Workspace,
     /// The scan over marched samples.
@@ -75,8 +78,10 @@ impl Workbench {
     /// When the configuration is out of range, or the adapter cannot hold it.
     pub fn new(gpu: &Arc<Gpu>, setup: &Setup) -> Result<Self> {
         let plan = setup.plan(gpu)?;
-        let workspace = allocate(gpu, &plan)?;
-        let bench = Self::of(gpu, plan, workspace)?;
+        let field = Field::new(gpu, plan)?;
+        let mut workspace = Workspace::for_training(&field, &visible_cells(field.plan()))?;
+        workspace.add(gpu.storage::<f32>("weights", field.plan().capacity.samples)?);
+        let bench = Self::of(field, workspace)?;
         bench.set_step(quiet_step());
         Ok(bench)
     }
@@ -85,9 +90,10 @@ impl Workbench {
     ///
     /// # Errors
     /// When the adapter refuses a kernel.
-    pub fn of(gpu: &Arc<Gpu>, plan: Plan, workspace: Workspace) -> Result<Self> {
-        let scan = Arc::new(march::scan(gpu, &plan, &workspace, march::Scanned::Samples)?);
-        Ok(Self { gpu: Arc::clone(gpu), plan, workspace, scan })
+    pub fn of(field: Field, workspace: Workspace) -> Result<Self> {
+        let (gpu, plan) = (Arc::clone(field.gpu()), field.plan().clone());
+        let scan = Arc::new(march::scan(&gpu, &plan, &workspace, march::Scanned::Samples)?);
+        Ok(Self { gpu, plan, field, workspace, scan })
     }
 
     /// Writes `data` at the start of a buffer or tensor, before the next submission.
@@ -282,10 +288,10 @@ impl Workbench {
         let (gpu, plan, workspace) = (&self.gpu, &self.plan, &self.workspace);
         let mut stages = density::stages(gpu, plan, workspace)?;
         stages.extend(color::stages(gpu, plan, workspace, color::Selection::Training)?);
-        stages.push(training::composite(gpu, plan, workspace, true)?);
-        stages.extend(training::backward(gpu, plan, workspace)?);
-        stages.extend(training::weight_gradients(gpu, plan, workspace)?);
-        stages.extend(training::update(gpu, plan, workspace)?);
+        stages.push(composite::stage(gpu, plan, workspace, true)?);
+        stages.extend(backward::stages(gpu, plan, workspace)?);
+        stages.extend(backward::weights(gpu, plan, workspace)?);
+        stages.extend(optimize::stages(gpu, plan, workspace)?);
         Ok(stages)
     }
 
@@ -314,10 +320,4 @@ impl Workbench {
 #[must_use]
 pub fn visible_cells(plan: &Plan) -> Vec<u32> {
     (0..plan.cell_count() as u32).filter(|cell| cell % 5 != 0).collect()
-}
-
-fn allocate(gpu: &Gpu, plan: &Plan) -> Result<Workspace> {
-    let mut workspace = Workspace::for_training(gpu, plan, &visible_cells(plan))?;
-    workspace.add(gpu.storage::<f32>("weights", plan.config.batch.samples)?);
-    Ok(workspace)
 }

@@ -4,7 +4,7 @@ use super::{DeviceRay, bounds, camera, is_close_to_a_fold};
 use crate::camera::{Camera, Lens};
 use crate::config::Background;
 use crate::field::records::Units;
-use crate::field::{self, Needs, RayTarget, dimension, training};
+use crate::field::{self, Needs, RayTarget, dimension, rays};
 use crate::gpu::banks::ROW;
 use crate::photo::Photo;
 use crate::photo::{Image, Pixels};
@@ -62,10 +62,11 @@ pub fn training_rays(subject: &Subject) -> Result<Tally> {
         let mut setup = Setup::tiny();
         setup.config.background = background;
         let lenses = LENSES.iter().map(Lens::kind).collect();
-        setup.needs = Needs { lenses, cameras: SIZES.len(), ..needs };
+        setup.needs = Needs { lenses, ..needs };
+        setup.bounds = bounds();
         let mut bench = subject.workbench(setup)?;
         let photos = Photos::upload(&mut bench, &mut Random::new(41))?;
-        let stage = training::rays(&bench.gpu, &bench.plan, &bench.workspace)?;
+        let stage = rays::stage(&bench.gpu, &bench.plan, &bench.workspace, SIZES.len())?;
         for count in [1, 3, 65, 250] {
             bench.set_rays(count);
             bench.run([&stage])?;
@@ -91,7 +92,7 @@ impl Photos {
             on_device.push(field::Camera {
                 first_row: (words.len() / ROW) as u32,
                 pixel_count: counts.len() as u32,
-                ..field::Camera::in_box(camera, &bounds())
+                ..field::Camera::in_box(camera, &bench.plan.space)
             });
             counting.push(counts);
             words.extend_from_slice(&record.of(photo, UNITS)?);

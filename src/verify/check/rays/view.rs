@@ -124,6 +124,7 @@ impl Bench {
     fn new(subject: &Subject, lenses: &[LensKind], rays: usize) -> Result<Self> {
         let mut setup = Setup::tiny();
         setup.needs.lenses = lenses.iter().copied().collect();
+        setup.bounds = super::bounds();
         setup.config.batch.rays = rays;
         let mut bench = subject.workbench(setup)?;
         bench.workspace.allocate(&bench.gpu, &viewing::demands(&bench.plan))?;
@@ -219,7 +220,7 @@ impl<'a> View<'a> {
     /// The rays of `count` pixels from `first` on.
     fn draw(&self, first: usize, count: usize) -> Result<Vec<DeviceRay>> {
         let Bench { bench, stage } = self.bench;
-        bench.write("view_camera", &[field::Camera::in_box(&self.camera, &bounds())]);
+        bench.write("view_camera", &[field::Camera::in_box(&self.camera, &bench.plan.space)]);
         begin_rays(bench, first..first + count);
         bench.run([stage])?;
         DeviceRay::read(bench, count)

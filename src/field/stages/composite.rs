@@ -1,0 +1,34 @@
+//! The fused render, loss and gradient kernel.
+
+use super::march::SPARE_ROWS;
+use crate::field::{Capacity, Link, Plan, RayResult, Workspace, dispatch};
+use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
+use crate::gpu::pass::Stage;
+use crate::gpu::tensor::Element;
+use anyhow::Result;
+
+/// What it takes of kept samples and rays, what the rays show, and the gradients of colours and log-densities.
+pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+    let Capacity { rays, samples, kept } = plan.capacity;
+    let rows = kept + SPARE_ROWS;
+    let mut demands = vec![
+        plan.tensor("kept_steps", Element::Vec4, 2 * rows),
+        Demand::storage::<f32>("ray_tails", rays),
+        Demand::storage::<RayResult>("ray_results", rays),
+        plan.tensor("d_color", Element::Vec4, rows),
+    ];
+    if plan.needs_distances() {
+        demands.push(Demand::storage::<f32>("sample_distances", samples));
+    }
+    demands
+}
+
+/// The kernel; `weights` asks for the samples' weights too.
+///
+/// # Errors
+/// When it cannot be built.
+pub fn stage(gpu: &Gpu, plan: &Plan, workspace: &Workspace, weights: bool) -> Result<Stage> {
+    let weights = if weights { "stored" } else { "none" };
+    plan.stage(gpu, workspace, &Link::of("composite").with("weights", weights), dispatch::RAYS)
+}

@@ -1,0 +1,96 @@
+//! From gradients to parameters: their range, the scatter into the table, and Adam, group by group.
+
+use crate::config::Accumulation;
+use crate::field::parameters::{GROUPS, Kernel, Learning};
+use crate::field::{Link, Plan, Workspace, dispatch};
+use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
+use crate::gpu::kernel::Bound;
+use crate::gpu::pass::Stage;
+use crate::gpu::tensor::{Element, Memory};
+use anyhow::Result;
+
+/// The gradients of the parameters, and their range.
+pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+    let ordered = plan.accumulation == Accumulation::Ordered;
+    let memory = if ordered { plan.memory } else { Memory::Buffers };
+    // Integers of 64 bits take twice the room of floats.
+    let words = if plan.accumulation == Accumulation::Fixed { 2 } else { 1 };
+    vec![
+        Demand::tensor("d_table", Element::Vec2, plan.layout.entries * words, memory),
+        Demand::storage::<[f32; 4]>("d_weights", plan.layout.quads),
+        Demand::storage::<u32>("gradient_range", 3),
+    ]
+}
+
+/// Finds out whether the gradients can be used, scatters into the table, updates all parameters and ends the
+/// step. A step whose gradients cannot be used changes nothing and is counted.
+///
+/// # Errors
+/// When a kernel cannot be built.
+pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
+    let bound = |link: &Link| workspace.bind(gpu, &plan.kernel(gpu, link)?, &[]);
+    let mut stages = vec![
+        plan.stage(gpu, workspace, &Link::of("gradient range"), dispatch::KEPT)?,
+        Stage::over(bound(&Link::of("weight sums"))?, plan.layout.quads),
+        scatter(gpu, plan, workspace)?,
+    ];
+    for group in GROUPS {
+        if let Some(learning) = &group.learning {
+            stages.push(adam(gpu, plan, workspace, group.name, learning)?);
+        }
+    }
+    stages.push(Stage::single(bound(&Link::of("finish").with("counted", "written"))?));
+    Ok(stages)
+}
+
+/// Adds the gradients of encodings to those of table entries.
+fn scatter(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
+    let ordered = plan.accumulation == Accumulation::Ordered;
+    let link = Link::of_file("scatter", if ordered { "scatter_ordered" } else { "scatter" });
+    if !ordered {
+        return plan.stage(gpu, workspace, &link, dispatch::KEPT);
+    }
+    Ok(Stage::over(workspace.bind(gpu, &plan.kernel(gpu, &link)?, &[])?, plan.layout.levels.len()))
+}
+
+/// Adam on a group.
+fn adam(
+    gpu: &Gpu,
+    plan: &Plan,
+    workspace: &Workspace,
+    name: &'static str,
+    learning: &Learning,
+) -> Result<Stage> {
+    let label = format!("adam {name}");
+    let bind = |link: Link, renamed: &[(&str, &str)]| -> Result<Bound> {
+        workspace.bind(gpu, &plan.kernel(gpu, &link.float("RATE", learning.rate))?, renamed)
+    };
+    let count = plan.arrays().find(|array| array.name == name).map_or(0, |array| array.count());
+    Ok(match learning.kernel {
+        // Two entries per thread.
+        Kernel::Table => Stage::wide(bind(Link::of_file(&label, "adam_table"), &[])?, count / 2 / 2),
+        Kernel::Dense(gradients) => {
+            let [first, second] = learning.moments();
+            let renamed = [
+                ("parameters", name),
+                ("first_moments", first),
+                ("second_moments", second),
+                ("gradients", gradients),
+            ];
+            let link = Link::of_file(&label, "adam_dense").count("PARAMETER_QUADS", count / 4);
+            Stage::over(bind(link, &renamed)?, count / 4)
+        }
+    })
+}
+
+/// Describes how the table's gradients are summed.
+#[must_use]
+pub fn accumulation_name(accumulation: Accumulation) -> &'static str {
+    match accumulation {
+        Accumulation::Fixed => "integer gradients",
+        Accumulation::Ordered => "ordered gradients",
+        Accumulation::Float => "float-atomic gradients",
+        Accumulation::Auto | Accumulation::Exchange => "compare-exchange gradients",
+    }
+}

@@ -1,0 +1,21 @@
+//! Drawing the rays of a step: pixels of photos, what they show, and what is behind it.
+
+use crate::field::{Link, Plan, RayTarget, Workspace, dispatch, records};
+use crate::gpu::Gpu;
+use crate::gpu::demand::Demand;
+use crate::gpu::pass::Stage;
+use anyhow::Result;
+
+/// What the rays should show.
+pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+    vec![Demand::storage::<RayTarget>("ray_targets", plan.capacity.rays)]
+}
+
+/// Draws the rays of a step, from `cameras` cameras.
+///
+/// # Errors
+/// When the kernel cannot be built.
+pub fn stage(gpu: &Gpu, plan: &Plan, workspace: &Workspace, cameras: usize) -> Result<Stage> {
+    let link = Link::of("rays").part(records::NAME, workspace.banks_part()?).count("CAMERA_COUNT", cameras);
+    plan.stage(gpu, workspace, &link, dispatch::RAYS)
+}
