@@ -17,7 +17,7 @@ const LAYER_ROWS: usize = 4096;
 /// Bytes that software drivers allow for all layers of a texture stay below this.
 const TEXTURE_BYTES: u64 = 1 << 30;
 const ROW_BYTES: u64 = (ROW * size_of::<u32>()) as u64;
-/// Storage buffers that a kernel may need besides; `tests/shaders.rs` sees to it.
+/// Storage buffers that a kernel may need besides; `tests/library/shaders.rs` sees to it.
 const OTHER_BINDINGS: u32 = 3;
 /// Bytes written before the device is waited for, which then lets go of its staging memory.
 const STAGED_BYTES: u64 = 64 << 20;

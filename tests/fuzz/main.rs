@@ -1,7 +1,8 @@
 //! The reader of transforms.json under random damage: it never panics, is quick, and says little.
 //!
 //! `NERF_FUZZ_CASES=1000000 cargo test --test fuzz -- --nocapture damaged` runs longer than the few
-//! thousand cases of an ordinary test run, prints how long it took, and looks at memory.
+//! thousand cases of an ordinary test run, prints how long it took, and looks at memory. Memory is that of the whole
+//! process, so nothing else is tested in it.
 
 mod damage;
 

@@ -1,5 +1,6 @@
 //! `scripts/gpu.sh` and `scripts/gpu_results.py` from end to end, with programs that stand in for nerf and its benchmarks:
-//! parts that fail, hang or find wrong kernels, and a call that is killed.
+//! parts that fail, hang or find wrong kernels, and a call that is killed. Parts are given seconds, so no training runs
+//! beside them in this process.
 #![cfg(unix)]
 
 use assert_cmd::Command;

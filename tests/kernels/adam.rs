@@ -1,7 +1,7 @@
 //! The optimiser where there is nothing to divide by.
 
 use anyhow::Result;
-use nerf::field::training;
+use nerf::field::optimize;
 use nerf::verify::check::Setup;
 use nerf::verify::check::adam::begin;
 

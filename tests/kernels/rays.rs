@@ -2,7 +2,6 @@
 
 use anyhow::Result;
 use glam::{DAffine3, DVec2, DVec3};
-use nerf::camera::Bounds;
 use nerf::camera::{Camera, Lens, LensKind};
 use nerf::field::render::Renderer;
 use nerf::field::viewing;
@@ -16,9 +15,8 @@ use crate::close::assert_close;
 #[test]
 fn lenses_that_were_left_out_are_refused() -> Result<()> {
     let bench = workbench(Setup::tiny())?;
-    let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades: 1, source: String::new() };
     let linked = [LensKind::Pinhole, LensKind::OpenCv].into();
-    let mut renderer = Renderer::new(&bench.gpu, &bench.plan, &bench.workspace, &bounds, &linked)?;
+    let mut renderer = Renderer::new(&bench.field, &linked)?;
     let mut camera = Camera {
         width: 3,
         height: 2,

@@ -1,7 +1,6 @@
 //! The selection where more samples are kept than fit.
 
 use anyhow::Result;
-use nerf::field::march::kept_capacity;
 use nerf::verify::check::Setup;
 use nerf::verify::check::draw::{Random, random_batch};
 use nerf::verify::check::selection::Selecting;
@@ -16,7 +15,7 @@ fn too_many_kept_samples() -> Result<()> {
     setup.config.batch.kept = 60;
     let selecting = Selecting::new(&subject()?, setup)?;
     let bench = &selecting.bench;
-    let capacity = kept_capacity(&bench.plan.config.batch);
+    let capacity = bench.plan.capacity.kept;
     let mut random = Random::new(32);
     for (rays, samples) in [(33, 130), (2, 130), (130, capacity), (150, 260)] {
         let batch = random_batch(&mut random, rays, samples);

@@ -1,0 +1,15 @@
+//! The program as its users start it: every command, what it says and writes, and the page about a training.
+//!
+//! Trainings need an adapter; a software driver (lavapipe) is enough.
+
+mod bench;
+mod check;
+mod cli;
+mod info;
+mod program;
+mod report;
+mod scores;
+mod sidecars;
+#[path = "../support/mod.rs"]
+mod support;
+mod training;

@@ -1,0 +1,294 @@
+//! Training, resuming, measuring and rendering from end to end, on whatever adapter there is.
+
+use crate::program::{SMOKE, checkpoint, generated, number, object, place, quietly, rows, text, train};
+use nerf::camera::LensKind;
+use nerf::capture::image::read_exr_channel;
+use predicates::prelude::*;
+use predicates::str::contains;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+/// In decibels. The smoke test reaches 27.6 on a CPU adapter. With a wrong factor in the density gradient it
+/// reached 20.1, with the background behind every sample 22.3, and without the gradient of the features 19.2.
+const GATE_DB: f64 = 25.5;
+
+static TOYS: LazyLock<PathBuf> =
+    LazyLock::new(|| generated("toys", "toys", &["--views", "40", "--size", "60"]));
+
+#[test]
+fn a_short_training_learns_the_scene() {
+    let run = place("smoke");
+    let result = train(&TOYS, &run, &["--steps", "1200", "--eval-every", "600"]);
+    let psnr = number(&result["psnr"]);
+    assert!(psnr > GATE_DB, "{psnr} dB");
+    assert!(number(&result["ssim"]) > 0.85 && result["steps"] == 1200 && result["views"] == 5);
+
+    let rows = rows(&run);
+    assert!(rows[0]["event"] == "start" && rows[0]["compile_seconds"].is_number());
+    let steps: Vec<&Value> = rows.iter().filter(|row| row.get("loss").is_some()).collect();
+    assert!(
+        steps.len() >= 75 && steps.windows(2).all(|pair| number(&pair[0]["step"]) < number(&pair[1]["step"]))
+    );
+    for row in &steps {
+        for key in ["step", "seconds", "loss", "psnr", "rays", "samples", "marched", "learning_rate"] {
+            assert!(row[key].is_number(), "{key} in {row}");
+        }
+        assert_eq!(row["skipped"], 0);
+    }
+    assert!(rows[0]["left_out"].is_array() && rows[0]["driver"].is_string());
+    let timed = rows.iter().rfind(|row| row["event"] == "stages");
+    let stages = timed.and_then(|row| row["stages"].as_array()).map_or(0, Vec::len);
+    assert!(
+        stages > 15 || !rows[0]["adapter"].to_string().contains("llvmpipe"),
+        "{stages} stages were timed"
+    );
+    let measured: Vec<&Value> = rows.iter().filter(|row| row.get("eval_psnr").is_some()).collect();
+    assert_eq!(
+        measured.iter().map(|row| row["views"].as_u64()).collect::<Vec<_>>(),
+        [Some(4), Some(4), Some(5)]
+    );
+
+    let eval = object(&["eval", text(&run), text(&TOYS)]);
+    assert!((number(&eval["psnr"]) - psnr).abs() < 0.01, "{} {psnr}", eval["psnr"]);
+    assert_eq!(
+        (eval["views"].as_array().map(Vec::len), &eval["background"]),
+        (Some(5), &Value::from("black"))
+    );
+    renders_the_depth_of_the_scene(&run);
+    renders_an_orbit_without_its_dataset(&run);
+}
+
+/// Z of rendered test views against the generator's ground truth.
+fn renders_the_depth_of_the_scene(run: &Path) {
+    let out = place("views");
+    let cameras = TOYS.join("transforms_test.json");
+    let args = ["render", text(run), "--out", text(&out), "--cameras", text(&cameras), "--frames", "1..3"];
+    quietly(&[&args[..], &["--format", "exr", "--format", "png", "--depth"]].concat()).assert().success();
+    let listing = fs::read_to_string(out.join("frames.json")).expect("a listing");
+    let listing: Value = serde_json::from_str(&listing).expect("JSON");
+    assert_eq!(listing["frames"].as_array().map(Vec::len), Some(2));
+    assert_eq!(listing["frames"][0]["source"], "./test/0001");
+    for index in 1..3 {
+        let truth = TOYS.join(format!("test/000{index}_depth.exr"));
+        let ours = out.join(format!("000{index}.exr"));
+        assert!(
+            out.join(format!("000{index}.png")).exists()
+                && out.join(format!("000{index}_depth.png")).exists()
+        );
+        let channel = |path: &Path, name| read_exr_channel(path, name).expect("the channel").2;
+        let (z, true_z) = (channel(&ours, "Z"), channel(&truth, "Z"));
+        let (alpha, true_alpha) = (channel(&ours, "A"), channel(&truth, "A"));
+        let mut errors: Vec<f32> = (0..z.len())
+            .filter(|&i| alpha[i] > 0.95 && true_alpha[i] > 0.999)
+            .map(|i| (z[i] - true_z[i]).abs())
+            .collect();
+        errors.sort_by(f32::total_cmp);
+        assert!(errors.len() > 200, "{} opaque pixels", errors.len());
+        // The cameras are 4 units away from a scene that is about 2.5 wide.
+        let median = errors[errors.len() / 2];
+        assert!(median < 0.06, "the median error of the depth is {median}");
+        let alpha_error: f32 = alpha.iter().zip(&true_alpha).map(|(a, b)| (a - b).abs()).sum();
+        assert!(alpha_error / (alpha.len() as f32) < 0.05, "{alpha_error}");
+    }
+}
+
+fn renders_an_orbit_without_its_dataset(run: &Path) {
+    let (alone, out) = (place("alone.safetensors"), place("orbit"));
+    fs::copy(run.join("checkpoint.safetensors"), &alone).expect("copied");
+    let args = ["render", text(&alone), "--out", text(&out), "--orbit", "2", "--width", "24", "--half"];
+    let result = object(&[&args[..], &["--format", "exr"]].concat());
+    assert_eq!(result["frames"], 2);
+    let (width, height, alpha) = read_exr_channel(&out.join("0001.exr"), "A").expect("alpha");
+    assert_eq!((width, height), (24, 24));
+    assert!(alpha.iter().any(|&a| a > 0.9) && alpha.iter().any(|&a| a < 0.1), "an object before nothing");
+    let missing = ["render", text(&alone), "--out", text(&out), "--orbit", "2", "--frames", "1..3"];
+    quietly(&missing).assert().code(1).stderr(contains("within 0..2"));
+}
+
+/// Without a schedule, so that the end of the first half makes no difference.
+#[test]
+fn two_halves_are_a_whole() {
+    let (whole, halves) = (place("whole"), place("halves"));
+    let constant = ["--set", "optimizer.final_learning_rate=0.01", "--no-eval", "--steps"];
+    train(&TOYS, &whole, &[&constant[..], &["72"]].concat());
+    train(&TOYS, &halves, &[&constant[..], &["40"]].concat());
+    train(&TOYS, &halves, &["--no-eval", "--resume", "--steps", "72"]);
+    same_field(&whole, &halves);
+    let steps: Vec<u64> =
+        rows(&halves).iter().filter_map(|row| row["loss"].as_f64().and(row["step"].as_u64())).collect();
+    assert_eq!(steps, [16, 32, 40, 56, 72]);
+    let again = train(&TOYS, &halves, &["--no-eval", "--resume"]);
+    assert_eq!(again["steps"], 72, "nothing is left to do");
+    quietly(&["train", text(&TOYS), "--out", text(&halves), "--resume", "--set", "grid.levels=16"])
+        .assert()
+        .code(1)
+        .stderr(contains("cannot change its grid"));
+}
+
+/// Ctrl-C in the middle of a schedule, which goes on as if nothing had happened.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_training_goes_on() {
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+    let (whole, parts) = (place("at_once"), place("interrupted"));
+    train(&TOYS, &whole, &["--no-eval", "--steps", "300"]);
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin!("nerf"))
+        .args(["train", text(&TOYS), "--out", text(&parts), "--config", SMOKE, "--steps", "300", "--quiet"])
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("starts");
+    let clock = Instant::now();
+    let is_under_way = || parts.join("log.jsonl").exists() && rows(&parts).len() > 2;
+    while !is_under_way() && clock.elapsed() < Duration::from_secs(120) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let signalled = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(signalled.expect("kill runs").success());
+    assert_eq!(child.wait().expect("ends").code(), Some(0), "interrupting is no failure");
+    let step = checkpoint(&parts).about.step;
+    assert!((16..300).contains(&step), "interrupted at {step}");
+    train(&TOYS, &parts, &["--no-eval", "--resume"]);
+    same_field(&whole, &parts);
+}
+
+/// Bit for bit where the sums of gradients do not depend on the order of threads, which a CPU's do not.
+fn same_field(one: &Path, other: &Path) {
+    let (one, other) = (checkpoint(one), checkpoint(other));
+    assert_eq!(one.state.step, other.state.step);
+    if one.about.adapter.contains("llvmpipe") {
+        assert!(one.state == other.state, "the fields differ");
+    }
+    let sum = |table: &[f32]| table.iter().map(|&value| f64::from(value).abs()).sum::<f64>();
+    let (a, b) = (sum(one.state.floats("table")), sum(other.state.floats("table")));
+    assert!((a - b).abs() < 0.05 * a, "{a} {b}");
+}
+
+#[test]
+fn held_out_views_stay_held_out() {
+    let (dataset, run) = (generated("toys", "single", &["--views", "11", "--size", "16"]), place("held"));
+    fs::rename(dataset.join("transforms_train.json"), dataset.join("transforms.json")).expect("renamed");
+    for split in ["val", "test"] {
+        fs::remove_file(dataset.join(format!("transforms_{split}.json"))).expect("removed");
+    }
+    train(&dataset, &run, &["--steps", "20", "--hold-out", "4", "--background", "random"]);
+    let splits = checkpoint(&run).about.splits;
+    assert_eq!(splits.test, ["./train/0000", "./train/0004", "./train/0008"]);
+    assert!(splits.test.iter().all(|name| !splits.train.contains(name)));
+    let eval = object(&["eval", text(&run), text(&dataset), "--background", "white"]);
+    let files: Vec<_> =
+        eval["views"].as_array().expect("views").iter().map(|view| view["file"].clone()).collect();
+    assert_eq!(files, splits.test);
+    let elsewhere = ["train", text(&TOYS), "--out", text(&run), "--resume"];
+    quietly(&elsewhere).assert().code(1).stderr(contains("resume with"));
+}
+
+/// A linear field, lenses of every kind, cascades: a few steps and a view of each.
+#[test]
+fn every_kind_of_scene_trains() {
+    let small = ["--views", "6", "--size", "24x16", "--samples", "1"];
+    use LensKind::{Fisheye, OpenCv, Orthographic, Pinhole};
+    let scenes = [
+        ("courtyard", "--lens", vec![OpenCv]),
+        ("fog", "--hdr", vec![Pinhole]),
+        // Four views to train on.
+        ("toys", "--lens=mixed", vec![Pinhole, OpenCv, Fisheye, Orthographic]),
+    ];
+    for (scene, further, lenses) in scenes {
+        let dataset = generated(scene, &format!("{scene}_of_every_kind"), &[&small[..], &[further]].concat());
+        let (run, out) = (place(&format!("{scene}_run")), place(&format!("{scene}_views")));
+        let result = train(&dataset, &run, &["--steps", "24"]);
+        assert!(number(&result["psnr"]) > 4.0, "{scene}: {result}");
+        let about = checkpoint(&run).about;
+        assert_eq!(about.needs.lenses, lenses.into_iter().collect());
+        assert_eq!((about.needs.hdr, about.bounds.cascades > 1), (scene == "fog", scene == "courtyard"));
+        let cameras = dataset.join("transforms_test.json");
+        let args = ["render", text(&run), "--out", text(&out), "--cameras", text(&cameras)];
+        quietly(&[&args[..], &["--format", "png", "--format", "exr", "--background", "white"]].concat())
+            .assert()
+            .success();
+        assert_eq!(read_exr_channel(&out.join("0000.exr"), "Z").expect("depth").0, 24);
+    }
+}
+
+#[test]
+fn a_diverging_training_stops_and_keeps_the_good_checkpoint() {
+    let run = place("diverging");
+    train(&TOYS, &run, &["--no-eval", "--steps", "16"]);
+    let mut diverging = checkpoint(&run);
+    diverging.state.floats_mut("mlp").iter_mut().for_each(|weight| *weight *= 1e30);
+    let file = run.join("checkpoint.safetensors");
+    diverging.save(&file).expect("writable");
+    let before = fs::read(&file).expect("a checkpoint");
+    quietly(&["train", text(&TOYS), "--out", text(&run), "--resume", "--steps", "64"])
+        .assert()
+        .code(1)
+        .stderr(contains("not finite").and(contains("learning_rate")).and(contains("step 16 is kept")));
+    assert_eq!(fs::read(&file).expect("still there"), before);
+}
+
+/// Far too high a learning rate ends with a message or in a field that is all numbers.
+#[test]
+fn far_too_high_learning_rates() {
+    for rate in ["1", "1000"] {
+        let run = place(&format!("rate_{rate}"));
+        let rate = format!("optimizer.learning_rate={rate}");
+        let args =
+            ["train", text(&TOYS), "--out", text(&run), "--config", SMOKE, "--steps", "64", "--set", &rate];
+        let output = quietly(&args).assert().get_output().clone();
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        let result = String::from_utf8_lossy(&output.stdout).into_owned();
+        match output.status.code() {
+            Some(0) => {
+                checkpoint(&run);
+                assert!(rate == "optimizer.learning_rate=1" || result.contains("smaller"), "{result}");
+            }
+            Some(1) => assert!(message.contains("learning_rate"), "{message}"),
+            other => panic!("exit code {other:?}: {message}"),
+        }
+    }
+}
+
+/// In any number of threads, and with the clock at another time. A software driver's threads are counted by
+/// `LP_NUM_THREADS`.
+#[test]
+fn deterministic_trainings_are_equal_bit_for_bit() {
+    for accumulation in ["auto", "fixed"] {
+        let set = format!("accumulation={accumulation}");
+        let bytes = |threads: &str, steps: &[&str]| {
+            let run = place(&format!("deterministic_{accumulation}_{threads}"));
+            for (number, steps) in steps.iter().enumerate() {
+                let args = [
+                    "train",
+                    text(&TOYS),
+                    "--out",
+                    text(&run),
+                    "--deterministic",
+                    "--no-eval",
+                    "--set",
+                    &set,
+                ];
+                let mut command = quietly(&args);
+                // A constant learning rate, so that a stop in the middle makes no difference.
+                command.args(["--set", "optimizer.final_learning_rate=0.01", "--steps", steps]);
+                match number {
+                    0 => command.args(["--config", SMOKE]),
+                    _ => command.arg("--resume"),
+                };
+                command.env("LP_NUM_THREADS", threads).assert().success();
+            }
+            fs::read(run.join("checkpoint.safetensors")).expect("a checkpoint")
+        };
+        let first = bytes("1", &["48"]);
+        assert!(first == bytes("2", &["48"]), "{accumulation}: the checkpoints differ");
+        assert!(first == bytes("3", &["20", "48"]), "{accumulation}: the resumed checkpoint differs");
+    }
+    let run = place("deterministic_seconds");
+    let args = ["train", text(&TOYS), "--out", text(&run), "--set", "deterministic=true", "--seconds", "3"];
+    quietly(&args).assert().code(1).stderr(contains("--steps"));
+    let args =
+        ["train", text(&TOYS), "--out", text(&run), "--deterministic", "--set", "accumulation=exchange"];
+    quietly(&args).assert().code(1).stderr(contains("accumulation must be auto"));
+}
