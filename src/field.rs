@@ -1,10 +1,13 @@
 //! The radiance field on a device: its parameters and kernels, training it and rendering it.
 
-mod capacity;
+mod capabilities;
+pub mod capacity;
 pub mod checkpoint;
 mod constants;
 mod demands;
+pub mod dispatch;
 mod features;
+mod kernels;
 pub mod layer;
 pub mod layout;
 pub mod lenses;
@@ -17,18 +20,20 @@ mod shared;
 pub mod silhouette;
 mod space;
 pub mod stages;
+pub mod state;
 pub mod train;
 mod variants;
 pub mod views;
 pub mod visibility;
 mod workspace;
 
-pub use capacity::Capacity;
+pub use capabilities::Capabilities;
+pub use capacity::{Capacity, Rounds};
 pub use constants::{RELATIVE_FLOOR, STEP_GROWTH, STEP_SHRINKAGE, dimension};
 pub use features::Needs;
 pub use link::Link;
-pub use plan::{Plan, Traits, dispatch};
-pub use shared::{Camera, Counters, LAYOUTS, Progress, RayResult, RayTarget, Step};
+pub use plan::Plan;
+pub use shared::{Camera, Counters, LAYOUTS, Progress, RayResult, RayTarget, Step, Tile};
 pub use space::Space;
 pub use stages::{backward, color, composite, density, march, occupancy, optimize, rays, viewing};
 pub use workspace::Workspace;
@@ -78,7 +83,7 @@ impl Field {
     /// # Errors
     /// When the adapter cannot hold it.
     pub fn of(gpu: &Arc<Gpu>, checkpoint: &Checkpoint) -> Result<Self> {
-        let mut field = Self::allocate(gpu, checkpoint.about.plan(Traits::of(gpu)), false)?;
+        let mut field = Self::allocate(gpu, checkpoint.about.plan(Capabilities::of(gpu)), false)?;
         field.arrays.set_arrays(gpu, &field.plan, &checkpoint.state.arrays)?;
         field.step_excess = StepExcess::Known(checkpoint.state.step_excess);
         Ok(field)
@@ -102,7 +107,7 @@ impl Field {
 
     /// The same field, of whose views as much is in work at once as `rounds` say.
     #[must_use]
-    pub fn with_rounds(&self, rounds: viewing::Rounds) -> Self {
+    pub fn with_rounds(&self, rounds: Rounds) -> Self {
         Self { plan: Plan { rounds, ..self.plan.clone() }, ..self.clone() }
     }
 

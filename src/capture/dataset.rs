@@ -6,6 +6,7 @@
 mod frames;
 mod intrinsics;
 mod json;
+mod listing;
 mod located;
 mod look_ahead;
 pub(crate) mod notes;
@@ -26,10 +27,10 @@ use crate::camera::{Bounds, Camera};
 use crate::capture::focus;
 use crate::photo::{BitDepth, Reading, Split};
 pub use intrinsics::Intrinsics;
+pub use listing::{DepthEntry, Entry, Listing, SceneBox};
 pub use notes::{Note, Severity};
 pub use open::read_cameras;
 pub(crate) use photo::nothing_counts;
-pub use sidecars::DepthEntry;
 pub use splits::{HoldOut, evenly_spaced, spread_order};
 
 /// A dataset: what is listed, what was found, and what was assumed.

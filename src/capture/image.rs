@@ -12,7 +12,7 @@ use ::image::metadata::Orientation;
 use ::image::{ExtendedColorType, ImageEncoder};
 use anyhow::{Context, Result, ensure};
 
-use crate::photo::{BitDepth, Image};
+use crate::photo::{BitDepth, Image, Turn};
 use crate::support::file::write_atomically;
 use decode::Kind;
 pub use depth::{DepthMap, load_depth};
@@ -56,6 +56,20 @@ impl Image {
             Kind::Common(format) => decode::load(path, format),
         };
         of_file(path, load)
+    }
+}
+
+impl Turn {
+    /// The turn that an orientation in the metadata asks for; `None` for those that keep width and height.
+    #[must_use]
+    pub fn of(orientation: Orientation) -> Option<Self> {
+        match orientation {
+            Orientation::Rotate90 => Some(Self::Right),
+            Orientation::Rotate270 => Some(Self::Left),
+            Orientation::Rotate90FlipH => Some(Self::Transpose),
+            Orientation::Rotate270FlipH => Some(Self::Transverse),
+            _ => None,
+        }
     }
 }
 

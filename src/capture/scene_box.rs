@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
+use super::dataset::SceneBox;
 use super::dataset::notes::Notes;
-use super::dataset::transforms::SceneBox;
 use super::focus::{Axis, Focus, FocusKind, find, median};
 use crate::camera::{Bounds, Camera, Ray};
 

@@ -1,6 +1,6 @@
 //! How much a step or a round of a view has room for.
 
-use super::viewing::Rounds;
+use super::{Capabilities, Needs};
 use crate::config::Batch;
 
 /// Room for rays and samples, which buffers are sized by.
@@ -28,5 +28,41 @@ impl Capacity {
     pub fn of_rounds(rounds: &Rounds) -> Self {
         let samples = rounds.samples.max(rounds.rays);
         Self { rays: rounds.rays, samples, kept: samples }
+    }
+}
+
+/// How much of a view is in work at once. Rays are marched front to back in rounds of a few samples; one that ended
+/// makes room for the next pixel's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rounds {
+    /// Rays in work.
+    pub rays: usize,
+    /// Samples of a round, at least one for each ray; fewer rays may ask for more each.
+    pub samples: usize,
+    /// Most samples of a ray in a round: those behind an opaque surface are computed in vain.
+    pub most_quota: usize,
+    /// Most pixels between two read-backs.
+    pub band: usize,
+    /// Samples get colour wherever the weights since the last one sum to this, and stand for those in between.
+    pub color_weight: f64,
+}
+
+/// What does not show in 32 bits.
+pub const LEAST_WEIGHT: f64 = 1e-12;
+
+impl Rounds {
+    /// What suits an adapter: few samples in vain on a CPU, few rounds on a GPU.
+    pub(crate) fn suited_to(adapter: Capabilities) -> Self {
+        if adapter.is_cpu {
+            Self { rays: 1 << 13, samples: 1 << 15, most_quota: 16, band: 1 << 20, color_weight: 1e-3 }
+        } else {
+            Self { rays: 1 << 15, samples: 1 << 18, most_quota: 64, band: 1 << 22, color_weight: 1e-3 }
+        }
+    }
+
+    /// The weight of a colour. Without a bound on the colours there is none on the error of one that stands for
+    /// others: in linear light every sample has its own.
+    pub(crate) fn color_weight(&self, needs: &Needs) -> f64 {
+        if needs.hdr { LEAST_WEIGHT } else { self.color_weight }
     }
 }

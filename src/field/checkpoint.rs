@@ -9,8 +9,8 @@ use crate::camera::orbit::Orbit;
 use crate::config::Config;
 use crate::config::schedule::Budget;
 use crate::field::parameters::{Array, Numbers};
-use crate::field::train::State;
-use crate::field::{Needs, Plan, Space, Traits};
+use crate::field::state::State;
+use crate::field::{Capabilities, Needs, Plan, Space};
 use crate::photo::{Reading, Split};
 use crate::support::file::write_atomically;
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -107,13 +107,13 @@ const RETIRED: [(&str, &str); 3] =
 impl About {
     /// How kernels are linked for an adapter.
     #[must_use]
-    pub fn plan(&self, adapter: Traits) -> Plan {
+    pub fn plan(&self, adapter: Capabilities) -> Plan {
         Plan::suited_to(adapter, self.config.clone(), self.needs.clone(), Space::from(&self.bounds))
     }
 
     /// The arrays of the state, which are the same on every adapter.
     fn arrays(&self) -> impl Iterator<Item = Array> {
-        let arrays: Vec<_> = self.plan(Traits::GPU).arrays().collect();
+        let arrays: Vec<_> = self.plan(Capabilities::GPU).arrays().collect();
         arrays.into_iter()
     }
 

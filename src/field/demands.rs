@@ -2,8 +2,8 @@
 
 use super::layout::Level;
 use super::{
-    Field, Plan, Traits, Workspace, backward, color, composite, density, march, occupancy, optimize, rays,
-    viewing,
+    Capabilities, Field, Plan, Workspace, backward, color, composite, density, march, occupancy, optimize,
+    rays, viewing,
 };
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
@@ -16,7 +16,7 @@ impl Plan {
     /// # Errors
     /// When it cannot: says what it lacks, and what to change.
     pub fn check(&self, gpu: &Gpu) -> Result<()> {
-        Traits::of(gpu).check(self.accumulation, &gpu.info.name)?;
+        Capabilities::of(gpu).check(self.accumulation, &gpu.info.name)?;
         let demands = self
             .training_demands(self.cell_count())
             .into_iter()

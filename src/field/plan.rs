@@ -1,37 +1,13 @@
-//! The list of kernels: which parts each one links, which buffers it is given, in which order they run.
+//! Everything that decides how kernels are linked, and how large their buffers are.
 //!
-//! Parts for what a scene does not need (a lens, cascades, alpha, …) are not linked, their buffers are not
-//! allocated and their stages are not dispatched.
-
+use super::capacity::Rounds;
 use super::layout::Layout;
-use super::{Capacity, Link, Needs, Space, Workspace, layer, shared, viewing};
+use super::{Capabilities, Capacity, Needs, Space, layer};
 use crate::camera::LensKind;
 use crate::config::{Accumulation, ColorLoss, Config};
 use crate::gpu::Gpu;
-use crate::gpu::kernel::Kernel;
-use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Memory;
-use crate::support::file::write_atomically;
-use anyhow::{Result, ensure};
 use std::collections::BTreeSet;
-use std::io::Write;
-use std::path::Path;
-
-/// Indices of the dispatch sizes that kernels write.
-pub mod dispatch {
-    /// Over rays.
-    pub const RAYS: usize = 0;
-    /// Over marched samples and pairs of levels.
-    pub const ENCODE: usize = 1;
-    /// Over marched samples, several per thread.
-    pub const SAMPLE_TILES: usize = 2;
-    /// Over kept samples.
-    pub const KEPT: usize = 3;
-    /// Over kept samples, several per thread.
-    pub const KEPT_TILES: usize = 4;
-    /// How many there are.
-    pub const COUNT: usize = 5;
-}
 
 /// llvmpipe ends the loops of a thread after so many rounds together, without an error; ordered sums have one round
 /// per kept sample.
@@ -59,67 +35,19 @@ pub struct Plan {
     /// Chunks of samples whose weight gradients are summed apart: what runs side by side.
     pub chunks: usize,
     /// How much of a view is in work at once.
-    pub rounds: viewing::Rounds,
-}
-
-/// What a plan depends on of an adapter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Traits {
-    /// It runs on the CPU.
-    pub is_cpu: bool,
-    /// It adds floats atomically.
-    pub float_atomics: bool,
-    /// It has subgroups of a multiple of 8 threads.
-    pub subgroups_of_8: bool,
-    /// Where its tensors are fast.
-    pub memory: Memory,
-}
-
-impl Traits {
-    /// A usual GPU.
-    pub const GPU: Self =
-        Self { is_cpu: false, float_atomics: true, subgroups_of_8: true, memory: Memory::Buffers };
-
-    /// Those of an adapter.
-    #[must_use]
-    pub fn of(gpu: &Gpu) -> Self {
-        Self {
-            is_cpu: gpu.is_cpu(),
-            float_atomics: gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC),
-            subgroups_of_8: gpu.has_subgroups_of(8),
-            memory: gpu.fast_memory(),
-        }
-    }
-
-    /// Whether an adapter called `name` can sum gradients like this.
-    ///
-    /// # Errors
-    /// When it cannot: says why, and what to take instead.
-    pub fn check(&self, accumulation: Accumulation, name: &str) -> Result<()> {
-        ensure!(
-            accumulation != Accumulation::Ordered || self.is_cpu,
-            "ordered accumulation adds all gradients of a grid level in one thread: on a GPU like '{name}' a step would \
-             take seconds; leave it out, or ask for fixed, whose sum is the same in every run too"
-        );
-        ensure!(
-            accumulation != Accumulation::Float || self.float_atomics,
-            "float accumulation needs atomic addition of floats, and the adapter '{name}' does not have it; leave it \
-             out, or ask for exchange or fixed"
-        );
-        Ok(())
-    }
+    pub rounds: Rounds,
 }
 
 impl Plan {
     /// Chooses what depends on the adapter; `grid.finest` is never 0.
     #[must_use]
     pub fn new(gpu: &Gpu, config: Config, needs: Needs, space: Space) -> Self {
-        Self::suited_to(Traits::of(gpu), config, needs, space)
+        Self::suited_to(Capabilities::of(gpu), config, needs, space)
     }
 
     /// As [`Plan::new`], for an adapter that need not be there.
     #[must_use]
-    pub fn suited_to(adapter: Traits, config: Config, needs: Needs, space: Space) -> Self {
+    pub fn suited_to(adapter: Capabilities, config: Config, needs: Needs, space: Space) -> Self {
         let layout = Layout::new(&config);
         let capacity = Capacity::of_steps(&config.batch);
         let orders = adapter.is_cpu && capacity.kept <= LONGEST_LOOP;
@@ -139,7 +67,7 @@ impl Plan {
         };
         let chunks = if adapter.is_cpu { 32 } else { 512 };
         let product = layer::Product { rows, shared_weights };
-        let rounds = viewing::Rounds::suited_to(adapter);
+        let rounds = Rounds::suited_to(adapter);
         let memory = adapter.memory;
         Self { config, layout, needs, space, capacity, product, accumulation, memory, chunks, rounds }
     }
@@ -181,25 +109,6 @@ impl Plan {
         self.config.march.most_steps.div_ceil(32)
     }
 
-    /// A kernel behind the plan's constants, its structs compared with Rust's. The folder that the environment variable
-    /// NERF_DUMP_SHADERS names gets its text.
-    ///
-    /// # Errors
-    /// As [`Kernel::new`], or when that folder cannot be written to.
-    pub fn kernel(&self, gpu: &Gpu, link: &Link) -> Result<Kernel> {
-        let source = self.source(link)?;
-        if let Some(folder) = std::env::var_os("NERF_DUMP_SHADERS") {
-            let path = Path::new(&folder).join(format!("{}.wgsl", link.label().replace(' ', "_")));
-            write_atomically(&path, |file| Ok(file.write_all(source.text().as_bytes())?))?;
-        }
-        Kernel::new(gpu, &source, shared::LAYOUTS)
-    }
-
-    /// A kernel over a count that the device knows, one of [`dispatch`], bound to what it uses.
-    pub(crate) fn stage(&self, gpu: &Gpu, workspace: &Workspace, link: &Link, over: usize) -> Result<Stage> {
-        workspace.stage(workspace.bind(gpu, &self.kernel(gpu, link)?, &[])?, over)
-    }
-
     /// Whether the loss has use for distances along rays.
     #[must_use]
     pub fn needs_distances(&self) -> bool {
@@ -213,25 +122,5 @@ impl Plan {
             ColorLoss::Auto => self.needs.hdr,
             chosen => chosen == ColorLoss::Relative,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn adapters_refuse_sums_that_do_not_suit_them() {
-        let modest = Traits { float_atomics: false, ..Traits::GPU };
-        let software = Traits { is_cpu: true, ..modest };
-        let refusal = |adapter: Traits, accumulation| {
-            adapter.check(accumulation, "it").err().map(|error| error.to_string()).unwrap_or_default()
-        };
-        assert!(refusal(Traits::GPU, Accumulation::Ordered).contains("one thread"));
-        assert!(refusal(modest, Accumulation::Float).contains("exchange or fixed"));
-        for accumulation in [Accumulation::Exchange, Accumulation::Fixed] {
-            assert_eq!(refusal(modest, accumulation), "");
-        }
-        assert_eq!(refusal(Traits::GPU, Accumulation::Float) + &refusal(software, Accumulation::Ordered), "");
     }
 }

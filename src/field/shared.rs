@@ -1,7 +1,6 @@
 //! The structs that kernels and the host share.
 
 use super::Space;
-use super::backward::Tile;
 use super::lenses;
 use crate::camera::Lens;
 use crate::config::Optimizer;
@@ -128,6 +127,20 @@ gpu_struct! {
         rendered: [f32; 4],
         /// Squared errors of the four channels with their weights; opacity's also holds what further terms add.
         errors: [f32; 4],
+    }
+}
+
+gpu_struct! {
+    /// The shape of a layer whose weight gradient is summed; see `shaders/common/tile.wgsl`.
+    Tile {
+        /// Quads per row of inputs.
+        input_quads: u32,
+        /// First quad in the weight buffer.
+        first_quad: u32,
+        /// 1 when the inputs lie in the order of all marched samples.
+        of_samples: u32,
+        /// Padding.
+        unused: u32,
     }
 }
 

@@ -4,7 +4,7 @@
 //! what happened since the last report.
 
 use crate::field::layout::pcg;
-use crate::field::parameters::Numbers;
+use crate::field::state::State;
 use crate::field::views::Views;
 use crate::field::visibility::hidden_cells;
 use crate::field::{
@@ -50,35 +50,6 @@ pub struct StepStats {
     pub loss: f64,
     /// Mean squared error of the colour, relative to the colour where the loss is.
     pub color_error: f64,
-}
-
-/// Everything that a training needs to go on as if it had never stopped.
-#[derive(Clone, Debug, PartialEq)]
-pub struct State {
-    /// Steps taken.
-    pub step: u32,
-    /// Rays of the next step.
-    pub rays: u32,
-    /// By how much its steps along the rays are longer than the configuration's, as a share of them.
-    pub step_excess: f32,
-    /// The numbers of the plan's [arrays](Plan::arrays), in that order.
-    pub arrays: Vec<(&'static str, Numbers)>,
-}
-
-impl State {
-    /// The numbers of an array of floats; none where there is no such array.
-    #[must_use]
-    pub fn floats(&self, name: &str) -> &[f32] {
-        self.arrays.iter().find(|(own, _)| *own == name).map_or(&[], |(_, numbers)| numbers.floats())
-    }
-
-    /// The same, to be changed.
-    pub fn floats_mut(&mut self, name: &str) -> &mut [f32] {
-        match self.arrays.iter_mut().find(|(own, _)| *own == name) {
-            Some((_, Numbers::Floats(numbers))) => numbers,
-            _ => &mut [],
-        }
-    }
 }
 
 impl Trainer {

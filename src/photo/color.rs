@@ -3,7 +3,7 @@
 //! A rendered colour is premultiplied by its opacity and in the field's colour space: sRGB for fields of 8-bit
 //! images, linear light for fields of HDR images.
 
-use super::{Image, Pixels};
+use super::image::{Image, Pixels};
 
 /// Opacities below this leave no colour to speak of.
 const LEAST_OPACITY: f32 = 1e-6;

@@ -1,6 +1,6 @@
 //! Rearranging the values of pixels: turning, cutting, and picking the nearest.
 
-use ::image::metadata::Orientation;
+use super::image::{Image, Pixels};
 
 /// A turn of a picture that swaps its width and its height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,18 +25,6 @@ pub struct Window {
 }
 
 impl Turn {
-    /// The turn that an orientation in the metadata asks for; `None` for those that keep width and height.
-    #[must_use]
-    pub fn of(orientation: Orientation) -> Option<Self> {
-        match orientation {
-            Orientation::Rotate90 => Some(Self::Right),
-            Orientation::Rotate270 => Some(Self::Left),
-            Orientation::Rotate90FlipH => Some(Self::Transpose),
-            Orientation::Rotate270FlipH => Some(Self::Transverse),
-            _ => None,
-        }
-    }
-
     /// Width and height afterwards.
     #[must_use]
     pub fn size(self, [width, height]: [u32; 2]) -> [u32; 2] {
@@ -82,9 +70,39 @@ pub(crate) fn nearest<T: Copy>(values: &[T], from: [u32; 2], to: [u32; 2]) -> Ve
     rows.iter().flat_map(|row| columns.iter().map(move |column| values[row * width + column])).collect()
 }
 
+impl Image {
+    /// The picture turned as [`Turn`] says.
+    pub(crate) fn turned(self, turn: Turn) -> Self {
+        let size = self.size();
+        let [width, height] = turn.size(size);
+        let pixels = match self.pixels {
+            Pixels::Srgb8(pixels) => Pixels::Srgb8(turn.apply(&pixels, size)),
+            Pixels::Srgb16(pixels) => Pixels::Srgb16(turn.apply(&pixels, size)),
+            Pixels::Linear(pixels) => Pixels::Linear(turn.apply(&pixels, size)),
+        };
+        Self { width, height, pixels, ..self }
+    }
+
+    /// The part of the picture inside `window`, which lies within it.
+    pub(crate) fn cropped(self, window: Window) -> Self {
+        let own = self.size();
+        if own == window.size {
+            return self;
+        }
+        let pixels = match self.pixels {
+            Pixels::Srgb8(pixels) => Pixels::Srgb8(crop(&pixels, own, window)),
+            Pixels::Srgb16(pixels) => Pixels::Srgb16(crop(&pixels, own, window)),
+            Pixels::Linear(pixels) => Pixels::Linear(crop(&pixels, own, window)),
+        };
+        let [width, height] = window.size;
+        Self { width, height, pixels, ..self }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ::image::metadata::Orientation;
     use ::image::{DynamicImage, GrayImage};
 
     #[test]

@@ -1,8 +1,5 @@
 //! Pixels as plain values: display-referred (sRGB) in 8 or 16 bits, and scene-linear.
 
-use super::grid::{Turn, Window, crop};
-use super::reduce::reduce;
-
 /// A decoded image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
@@ -65,40 +62,6 @@ impl Image {
         let lit = brightest.filter(|(value, alpha)| *value > 0.0 && *alpha > 0.5);
         let logs: Vec<f64> = lit.map(|(value, alpha)| f64::from(value / alpha).ln()).collect();
         (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
-    }
-
-    /// The picture turned as [`Turn`] says.
-    pub(crate) fn turned(self, turn: Turn) -> Self {
-        let size = self.size();
-        let [width, height] = turn.size(size);
-        let pixels = match self.pixels {
-            Pixels::Srgb8(pixels) => Pixels::Srgb8(turn.apply(&pixels, size)),
-            Pixels::Srgb16(pixels) => Pixels::Srgb16(turn.apply(&pixels, size)),
-            Pixels::Linear(pixels) => Pixels::Linear(turn.apply(&pixels, size)),
-        };
-        Self { width, height, pixels, ..self }
-    }
-
-    /// The part of the picture inside `window`, which lies within it.
-    pub(crate) fn cropped(self, window: Window) -> Self {
-        let own = self.size();
-        if own == window.size {
-            return self;
-        }
-        let pixels = match self.pixels {
-            Pixels::Srgb8(pixels) => Pixels::Srgb8(crop(&pixels, own, window)),
-            Pixels::Srgb16(pixels) => Pixels::Srgb16(crop(&pixels, own, window)),
-            Pixels::Linear(pixels) => Pixels::Linear(crop(&pixels, own, window)),
-        };
-        let [width, height] = window.size;
-        Self { width, height, pixels, ..self }
-    }
-
-    /// The pixels at `size`, which is at most as large: each is the mean of the area it covers.
-    pub(crate) fn reduced(self, size: [u32; 2]) -> Self {
-        let pixels = reduce(&self.pixels, self.size(), size);
-        let [width, height] = size;
-        Self { width, height, pixels, ..self }
     }
 
     /// 8-bit pixels in 16 bits; others as they are.

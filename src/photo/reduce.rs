@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::Pixels;
+use super::image::{Image, Pixels};
 
 /// The source pixels along one axis that a smaller pixel covers: the first one, and the share of each.
 struct Span {
@@ -53,8 +53,17 @@ fn each<T: Send>(from: [u32; 2], to: [u32; 2], make: impl Fn(Footprint<'_>) -> T
     rows.par_iter().map(row).collect::<Vec<_>>().into_iter().flatten().collect()
 }
 
+impl Image {
+    /// The pixels at `size`, which is at most as large: each is the mean of the area it covers.
+    pub(crate) fn reduced(self, size: [u32; 2]) -> Self {
+        let pixels = reduce(&self.pixels, self.size(), size);
+        let [width, height] = size;
+        Self { width, height, pixels, ..self }
+    }
+}
+
 /// Averages in the encoding of the pixels, weighted by area and, where alpha is straight, by alpha.
-pub(super) fn reduce(pixels: &Pixels, from: [u32; 2], to: [u32; 2]) -> Pixels {
+fn reduce(pixels: &Pixels, from: [u32; 2], to: [u32; 2]) -> Pixels {
     match pixels {
         Pixels::Srgb8(pixels) => Pixels::Srgb8(each(from, to, |covered| {
             straight_mean(covered.pixels().map(|(index, weight)| (pixels[index].map(f64::from), weight)))

@@ -9,7 +9,7 @@ mod damage;
 use std::time::{Duration, Instant};
 
 use damage::{cases, odd_values, seeds};
-use nerf::capture::dataset::transforms::{self, Listing};
+use nerf::capture::dataset::{Listing, transforms};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 

@@ -1,6 +1,7 @@
 //! The library from within, without starting its program: the reference, datasets, pictures, scenes, presets, charts,
 //! how kernels are linked, and trainings that must not break.
 
+mod architecture;
 mod chart;
 mod configs;
 mod corpus;

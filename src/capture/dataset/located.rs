@@ -7,10 +7,10 @@ use anyhow::{Context, Result, ensure};
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::listing::{Entry, Listing};
 use super::notes::{Notes, Severity};
 use super::photo::Source;
 use super::sidecars::{Finder, Sidecars};
-use super::transforms::{Entry, Listing};
 use super::{Frame, OpenOptions, Split, frames};
 use crate::capture::image::{FORMATS, Header};
 use crate::photo::Reading;

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
 
+use super::listing::Entry;
 use super::located::{Built, Present, locate};
 use super::notes::Notes;
 use super::samples::Samples;
-use super::transforms::{self, Entry};
+use super::transforms;
 use super::{Dataset, HoldOut, OpenOptions, Split, splits};
 use crate::camera::Bounds;
 use crate::camera::Camera;

@@ -19,20 +19,10 @@ use anyhow::Result;
 
 use super::frames;
 use super::json::Fields;
+use super::listing::{DepthEntry, Entry};
 use super::notes::{Notes, Severity};
-use super::transforms::Entry;
 use crate::capture::image::Header;
 use crate::photo::BitDepth;
-
-/// A depth file as a frame lists it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DepthEntry {
-    /// The file, as the frame spells it, with forward slashes.
-    pub path: String,
-    /// World units per step of a file of whole numbers; `None` if the file does not say. Files of floats are
-    /// in world units already.
-    pub world_per_unit: Option<f64>,
-}
 
 /// The files beside one photo.
 #[derive(Clone, Debug, Default)]

@@ -1,62 +1,22 @@
 //! The `transforms.json` family: what one file lists, before any image is looked for.
 
 mod dialect;
+mod ngp_box;
 mod outline;
-mod scene_box;
 mod split_lists;
 
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use glam::DAffine3;
 use serde_json::Value;
 
 use super::intrinsics::{self, Intrinsics, Stated};
 use super::json::{self, Fields, REMEDY, describe, shortened};
-use super::notes::{Note, Notes};
+use super::listing::{Entry, Listing, SceneBox};
+use super::notes::Notes;
 use super::pose::{self, Axes, handedness};
-use super::sidecars::{self, DepthEntry};
-use crate::photo::Split;
+use super::sidecars;
 use outline::Section;
-pub use scene_box::SceneBox;
-
-/// One parsed file.
-#[derive(Debug)]
-pub struct Listing {
-    /// The frames in the order of the file.
-    pub frames: Vec<Entry>,
-    /// The scene box of instant-ngp's keys, if the file has one of them.
-    pub scene_box: Option<SceneBox>,
-    /// Which family of tools writes such files.
-    pub dialect: &'static str,
-    pub(super) notes: Notes,
-}
-
-/// One frame as listed.
-#[derive(Clone, Debug)]
-pub struct Entry {
-    /// `frame 3 'images/0004.png'`, for messages; counts from 0.
-    pub label: String,
-    /// The image, as the file spells it, with forward slashes.
-    pub file_path: String,
-    /// Focal length, principal point and lens.
-    pub intrinsics: Intrinsics,
-    /// Camera-to-world pose: an orthonormal matrix, improper where the world is left-handed, and a position.
-    pub world_from_camera: DAffine3,
-    /// The split that the file's own lists put the frame in.
-    pub split: Option<Split>,
-    /// Its mask as the file spells it, with forward slashes; black pixels of it are ignored.
-    pub mask_path: Option<String>,
-    /// Its depth file.
-    pub depth: Option<DepthEntry>,
-}
-
-impl Listing {
-    /// What is to be said about how the file was read.
-    pub fn notes(&self) -> Vec<Note> {
-        self.notes.clone().finish()
-    }
-}
 
 /// Parses files of one dataset, whose poses follow one rule. Errors name the file, the frame and the key.
 pub(super) fn read(paths: &[&Path], notes: &mut Notes) -> Result<Vec<Listing>> {
@@ -218,6 +178,8 @@ fn report_unposed(unposed: &[String], posed: usize, notes: &mut Notes) -> Result
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::photo::Split;
+    use glam::DAffine3;
     use serde_json::{Map, json};
 
     /// A file with one frame, each with more keys.

@@ -10,7 +10,7 @@ use nerf::capture::dataset::Dataset;
 use nerf::capture::health::Finding;
 use nerf::config::Config;
 use nerf::field::layout::finest_resolution;
-use nerf::field::{Needs, Plan, Space, Traits};
+use nerf::field::{Capabilities, Needs, Plan, Space};
 use nerf::gpu::banks::Capacity;
 use nerf::run::memory::Memory;
 
@@ -41,7 +41,7 @@ impl Estimate {
             Err(error) if session.global.adapter.is_some() => return Err(error),
             opened => opened.ok(),
         };
-        let traits = gpu.as_ref().map_or(Traits::GPU, |gpu| Traits::of(gpu));
+        let traits = gpu.as_ref().map_or(Capabilities::GPU, |gpu| Capabilities::of(gpu));
         let cameras = cameras(dataset, &dataset.train);
         let config = defaults(traits.is_cpu, dataset)?;
         let needs = needs::of_headers(dataset, &config)?;
@@ -68,7 +68,7 @@ impl Estimate {
     }
 }
 
-fn plan(traits: Traits, mut config: Config, needs: Needs, bounds: &Bounds, cameras: &[Camera]) -> Plan {
+fn plan(traits: Capabilities, mut config: Config, needs: Needs, bounds: &Bounds, cameras: &[Camera]) -> Plan {
     let space = Space::from(bounds);
     config.grid.finest = finest_resolution(&config.grid, &space, cameras);
     Plan::suited_to(traits, config, needs, space)

@@ -14,8 +14,8 @@ use nerf::field::checkpoint::{About, Checkpoint, FORMAT, Splits};
 use nerf::field::layout::Layout;
 use nerf::field::layout::finest_resolution;
 use nerf::field::optimize::accumulation_name;
-use nerf::field::train::State;
-use nerf::field::{Plan, Space, Traits};
+use nerf::field::state::State;
+use nerf::field::{Capabilities, Plan, Space};
 use nerf::gpu::Gpu;
 use nerf::photo::Reading;
 use nerf::support::format::{count, few};
@@ -89,7 +89,7 @@ impl Setup {
             "a deterministic training needs --steps N and no --seconds: how many steps fit into a time differs from \
              run to run"
         );
-        let plan = about.plan(Traits::of(gpu));
+        let plan = about.plan(Capabilities::of(gpu));
         let cameras = cameras(dataset, &train);
         Ok(Self { about, plan, state, train, test, cameras })
     }

@@ -4,28 +4,14 @@ use super::color::COLOR_HIDDEN;
 use super::density::{layer_stage, quads};
 use super::march::SPARE_ROWS;
 use crate::field::layout::{DENSITY_OUTPUTS, Layer};
+use crate::field::shared::Tile;
 use crate::field::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::kernel::Kernel;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
-use crate::gpu_struct;
 use anyhow::Result;
-
-gpu_struct! {
-    /// The shape of a layer whose weight gradient is summed; see `shaders/common/tile.wgsl`.
-    Tile {
-        /// Quads per row of inputs.
-        input_quads: u32,
-        /// First quad in the weight buffer.
-        first_quad: u32,
-        /// 1 when the inputs lie in the order of all marched samples.
-        of_samples: u32,
-        /// Padding.
-        unused: u32,
-    }
-}
 
 /// Names of the gradients in front of each hidden layer's ReLU in the colour network.
 const D_COLOR_HIDDEN: [&str; 4] =

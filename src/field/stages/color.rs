@@ -18,7 +18,7 @@ pub const COLOR_HIDDEN: [&str; 4] = ["color_hidden_1", "color_hidden_2", "color_
 pub enum Selection {
     /// Those above the weight floor, and some of the others.
     Training,
-    /// Of a view's rays, one for every [`crate::field::viewing::Rounds`].
+    /// Of a view's rays, one for every [`crate::field::Rounds`].
     View,
 }
 

@@ -3,7 +3,7 @@
 use super::{Setup, Workbench};
 use crate::config::Accumulation;
 use crate::field::layer::Product;
-use crate::field::{Plan, Traits, optimize::accumulation_name};
+use crate::field::{Capabilities, Plan, optimize::accumulation_name};
 use crate::gpu::Gpu;
 use crate::gpu::tensor::Memory;
 use anyhow::{Result, ensure};
@@ -36,7 +36,7 @@ impl Subject {
     pub fn new(gpu: &Arc<Gpu>, forced: Forced) -> Result<Self> {
         let name = &gpu.info.name;
         if let Some(accumulation) = forced.accumulation {
-            Traits::of(gpu).check(accumulation, name)?;
+            Capabilities::of(gpu).check(accumulation, name)?;
         }
         ensure!(
             forced.memory != Some(Memory::Textures) || gpu.has(crate::gpu::tensor::TEXTURE_FEATURES),

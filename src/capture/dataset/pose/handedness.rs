@@ -3,8 +3,8 @@
 use anyhow::{Result, ensure};
 use glam::DAffine3;
 
+use crate::capture::dataset::listing::{Entry, Listing};
 use crate::capture::dataset::notes::Notes;
-use crate::capture::dataset::transforms::{Entry, Listing};
 use crate::capture::focus::{Axis, FocusKind, find};
 use crate::support::format::few;
 

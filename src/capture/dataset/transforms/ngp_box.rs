@@ -5,23 +5,13 @@ use glam::DVec3;
 use serde_json::Value;
 
 use crate::capture::dataset::json::{Fields, REMEDY};
+use crate::capture::dataset::listing::SceneBox;
 use crate::capture::dataset::notes::Notes;
 use crate::capture::dataset::pose::Axes;
 
-/// A scene box in instant-ngp's terms: `world * scale + offset` maps the inner cube to `[0, 1]³`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SceneBox {
-    /// Unit-cube lengths per world unit.
-    pub scale: f64,
-    /// Where the world's origin lies in the unit cube.
-    pub offset: DVec3,
-    /// Side of the whole box in inner cubes: a power of two, 1 to 128.
-    pub aabb_scale: u32,
-}
-
 impl SceneBox {
     /// Reads the keys of a file, if it has one of them.
-    pub(super) fn read(file: Fields, notes: &mut Notes) -> Result<Option<Self>> {
+    pub(in crate::capture::dataset) fn read(file: Fields, notes: &mut Notes) -> Result<Option<Self>> {
         if !file.has(&["aabb_scale", "scale", "offset", "aabb"]) {
             return Ok(None);
         }
