@@ -21,7 +21,7 @@ pub mod visibility;
 mod workspace;
 
 pub use constants::{RELATIVE_FLOOR, STEP_GROWTH, STEP_SHRINKAGE, dimension};
-pub use features::Needs;
+pub use features::SceneFeatures;
 pub use link::Link;
 pub use plan::{Plan, Traits, dispatch};
 pub use shared::{Camera, Counters, LAYOUTS, Progress, RayResult, RayTarget, Step};

@@ -30,33 +30,13 @@
 //! # A training in code
 //!
 //! ```no_run
-//! use nerf::{camera::LensKind, capture::dataset::Dataset, config::Config, gpu};
-//! use nerf::field::{Needs, Plan, parameters, train, views::Views};
+//! use nerf::{capture::dataset::Dataset, config::Config, field::train::Trainer, gpu};
 //! use std::{path::Path, sync::Arc};
 //!
 //! # fn main() -> anyhow::Result<()> {
 //! let dataset = Dataset::open(Path::new("data/lego"), &Default::default())?;
-//! let mut images = Vec::new();
-//! dataset.stream(&dataset.train, false, &mut |_, photo| Ok(images.push(photo.image)))?;
-//! let cameras: Vec<_> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
 //! let gpu = Arc::new(gpu::Gpu::open(&gpu::adapter::choose(None)?)?);
-//! let config = Config::default();
-//! let finest = parameters::finest_resolution(&config.grid, &dataset.bounds, &cameras);
-//! let layout = parameters::Layout::new(&config, finest);
-//! let needs = Needs {
-//!     lenses: LensKind::among(&cameras),
-//!     alpha: images.iter().any(|image| image.has_alpha),
-//!     hdr: dataset.is_hdr,
-//!     cascades: dataset.bounds.cascades,
-//!     cameras: cameras.len(),
-//!     ..Needs::default()
-//! };
-//! let plan = Plan::new(&gpu, config, layout, needs);
-//! let mut views = Views::new(&gpu, &plan, &cameras, &dataset.bounds)?;
-//! for image in images {
-//!     views.add(&image.into())?;
-//! }
-//! let mut trainer = train::Trainer::new(&gpu, plan, views)?;
+//! let mut trainer = Trainer::on(&gpu, &dataset, Config::for_dataset(&dataset, gpu.is_cpu())?)?;
 //! for _ in 0..1000 {
 //!     trainer.step(1e-2, None)?;
 //! }

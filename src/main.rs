@@ -2,6 +2,8 @@
 
 mod cli;
 mod commands;
+mod narrator;
+mod outcome;
 mod progress;
 mod remarks;
 

@@ -2,6 +2,7 @@
 
 use crate::cli::Global;
 use nerf::capture::dataset::{Dataset, Severity};
+use nerf::run::depths::fog;
 use std::io::Write;
 
 /// Prints remarks as far as they are wanted.
@@ -29,6 +30,13 @@ impl Remarks {
     /// Something that probably makes results worse.
     pub(crate) fn warn(self, line: &str) {
         self.say(&format!("warning: {line}"));
+    }
+
+    /// Warns where a near share looks like fog.
+    pub(crate) fn fog(self, near_share: Option<f64>) {
+        if let Some(fog) = near_share.and_then(fog) {
+            self.warn(&fog);
+        }
     }
 
     /// A line for `--verbose`.

@@ -8,7 +8,7 @@ use nerf::config::{Accumulation, Config};
 use nerf::field::layer::Product;
 use nerf::field::link::{self, Link};
 use nerf::field::parameters::Layout;
-use nerf::field::{LAYOUTS, Needs, Plan, Traits, records};
+use nerf::field::{LAYOUTS, Plan, SceneFeatures, Traits, records};
 use nerf::gpu::banks::Capacity;
 use nerf::gpu::kernel::Layout as StructLayout;
 use nerf::gpu::source::{Linked, Source};
@@ -45,7 +45,7 @@ fn definitions(text: &str) -> Vec<String> {
 
 fn plan(memory: Memory, cascades: u32) -> Plan {
     let config = Config::default();
-    let needs = Needs { alpha: true, cascades, cameras: 3, ..Needs::default() };
+    let needs = SceneFeatures { alpha: true, cascades, cameras: 3, ..SceneFeatures::default() };
     let layout = Layout::new(&config, 2048);
     let product = Product { rows: 2, shared_weights: false };
     let adapter = Traits { memory, ..Traits::GPU };

@@ -9,7 +9,7 @@ use nerf::field::render::{Renderer, View};
 use nerf::field::train::{State, StepStats, Trainer};
 use nerf::field::training::STATE;
 use nerf::field::views::Views;
-use nerf::field::{Counters, Needs, Plan};
+use nerf::field::{Counters, Plan, SceneFeatures};
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::{Image, Pixels};
 use std::sync::Arc;
@@ -94,12 +94,12 @@ impl Scene {
         let adapter = adapter::choose(choice.as_deref()).expect("an adapter");
         let gpu = Arc::new(Gpu::open(&adapter).expect("it opens"));
         let (cameras, images, bounds) = (self.cameras(), self.images(), self.bounds());
-        let needs = Needs {
+        let needs = SceneFeatures {
             lenses: LensKind::among(&cameras),
             alpha: self.has_alpha,
             hdr: images.iter().any(Image::is_hdr),
             cameras: cameras.len(),
-            ..Needs::default()
+            ..SceneFeatures::default()
         };
         let layout = Layout::new(&config, 64);
         let plan = Plan::new(&gpu, config, layout, needs);

@@ -1,20 +1,20 @@
 //! `nerf eval`: PSNR and SSIM against photos.
 
-use super::field::Field;
-use super::scores::{Compared, Judge, Means, Score, describe_near, warn_of_fog};
-use super::{Session, find_frames, open_to_compare, writable_folder};
+use super::{Session, open_to_compare, writable_folder};
 use crate::cli::Eval;
+use crate::outcome::describe_near;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
 use nerf::capture::dataset::Dataset;
 use nerf::capture::image::write_png_rgba8;
 use nerf::photo::Split;
 use nerf::photo::color::{ColorSpace, opaque_srgb8};
+use nerf::run::{Compared, Evaluator, Means, Score, TrainedField};
 use nerf::support::format::{count, few};
 use serde_json::{Value, json};
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
-    let field = Field::load(&args.run, session)?;
+    let field = session.load_field(&args.run)?;
     let dataset = open_to_compare(&args.dataset, &args.reading, &field.about)?;
     let indices = frames(&field, &dataset, args.split.split(), session)?;
     ensure!(
@@ -29,22 +29,22 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     }
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
-    let mut judge = Judge::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);
-    judge.background = args.background.color();
-    let scores = measure(judge, &indices, args, session)?;
+    let mut evaluator = Evaluator::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);
+    evaluator.background = args.background.color();
+    let scores = measure(evaluator, &indices, args, session)?;
     let means = Means::of(&scores).context("there was nothing to measure")?;
-    warn_of_fog(means.near_share, session.remarks);
+    session.remarks.fog(means.near_share);
     session.print(&report(args, &field, &scores, means), &describe(args, &scores, means, field.color_space()))
 }
 
 fn measure(
-    mut judge: Judge<'_>,
+    mut evaluator: Evaluator<'_>,
     indices: &[usize],
     args: &Eval,
     session: &Session<'_>,
 ) -> Result<Vec<Score>> {
     let mut scores = Vec::with_capacity(indices.len());
-    judge.each(indices, None, session.remarks, |_, compared| {
+    evaluator.each(indices, None, &mut session.narrator(), |_, compared| {
         let Compared { mut score, size: [width, height], rendered, .. } = compared;
         if let Some(folder) = &args.save {
             let file = format!("{:04}.png", scores.len());
@@ -58,9 +58,14 @@ fn measure(
 }
 
 /// The frames of a split as the training had it, else as the dataset has it.
-fn frames(field: &Field, dataset: &Dataset, split: Split, session: &Session<'_>) -> Result<Vec<usize>> {
+fn frames(
+    field: &TrainedField,
+    dataset: &Dataset,
+    split: Split,
+    session: &Session<'_>,
+) -> Result<Vec<usize>> {
     let names = field.about.splits.names(split);
-    let (found, missing) = find_frames(dataset, names);
+    let (found, missing) = dataset.find(names);
     if found.is_empty() {
         let indices = dataset.split(split).to_vec();
         ensure!(
@@ -88,11 +93,16 @@ fn frames(field: &Field, dataset: &Dataset, split: Split, session: &Session<'_>)
     Ok(found)
 }
 
+/// What is to be said of the number of pixels, if it is not the whole photo.
+fn remark(score: &Score) -> String {
+    score.ignored.map_or(String::new(), |pixels| format!("  without {}", count(pixels, "masked pixel")))
+}
+
 fn range(hdr: bool) -> &'static str {
     if hdr { "linear" } else { "display-referred" }
 }
 
-fn report(args: &Eval, field: &Field, scores: &[Score], means: Means) -> Value {
+fn report(args: &Eval, field: &TrainedField, scores: &[Score], means: Means) -> Value {
     json!({
         "psnr": means.psnr,
         "ssim": means.ssim,
@@ -109,7 +119,7 @@ fn report(args: &Eval, field: &Field, scores: &[Score], means: Means) -> Value {
 fn describe(args: &Eval, scores: &[Score], means: Means, color_space: ColorSpace) -> String {
     let mut lines: Vec<_> = scores
         .iter()
-        .map(|s| format!("{}  {:.3} dB  SSIM {:.4}{}", s.file, s.psnr, s.ssim, s.remark()))
+        .map(|s| format!("{}  {:.3} dB  SSIM {:.4}{}", s.file, s.psnr, s.ssim, remark(s)))
         .collect();
     let encoding = if color_space == ColorSpace::Linear { ", sRGB-encoded and clamped" } else { "" };
     lines.push(format!(

@@ -1,6 +1,5 @@
 //! `nerf info`: what a training would make of a dataset, before it takes a night.
 
-mod memory;
 mod page;
 mod problems;
 mod result;
@@ -9,13 +8,13 @@ use super::{Failed, Session};
 use crate::cli::info::Info;
 use crate::progress::Progress;
 use anyhow::Result;
-use memory::Estimate;
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::health::map::{self, Drawing};
 use nerf::capture::health::photos::{Gallery, Look};
 use nerf::capture::health::{Finding, Severity, Survey};
 use nerf::capture::image::write_png_rgba8;
 use nerf::photo::Reading;
+use nerf::run::Estimate;
 use nerf::support::file::write_atomically;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -79,8 +78,13 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
     problems.extend(survey.findings_with(gallery.as_ref(), dataset));
     let mut memory = None;
     if !dataset.train.is_empty() {
-        let estimate = Estimate::of(dataset, session)?;
-        problems.extend(estimate.problems());
+        // An adapter that was asked for must be there.
+        let gpu = match session.open_gpu() {
+            Err(error) if session.global.adapter.is_some() => return Err(error),
+            opened => opened.ok(),
+        };
+        let estimate = Estimate::of(dataset, gpu.as_deref())?;
+        problems.extend(problems::of_memory(&estimate));
         memory = Some(estimate);
     }
     Ok(Report { args, dataset, survey, gallery, memory, problems })

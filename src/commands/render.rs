@@ -1,6 +1,5 @@
 //! `nerf render`: a trained field seen from any cameras.
 
-use super::field::Field;
 use super::{Session, writable_folder};
 use crate::cli::{Format, PictureBackground, Render};
 use crate::progress::Progress;
@@ -11,7 +10,9 @@ use nerf::capture::dataset::read_cameras;
 use nerf::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::field::render::{Renderer, View};
 use nerf::photo::color::{ColorSpace, depth_srgb8, opaque_srgb8};
+use nerf::run::TrainedField;
 use nerf::support::file::write_atomically;
+use nerf::support::format::count;
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::panic::resume_unwind;
@@ -38,7 +39,7 @@ struct Writer<'a> {
 }
 
 pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
-    let field = Field::load(&args.run, session)?;
+    let field = session.load_field(&args.run)?;
     let jobs = jobs(args, &field)?;
     writable_folder(&args.out)?;
     let gpu = session.open_gpu()?;
@@ -61,7 +62,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     })?;
     let out = args.out.display().to_string();
     let result = json!({ "out": out, "frames": jobs.len(), "seconds": seconds });
-    session.print(&result, &format!("{} frames in {out}", jobs.len()))
+    session.print(&result, &format!("{} in {out}", count(jobs.len(), "frame")))
 }
 
 /// Renders the jobs in order, describes their files, and tells the seconds that each took to render. A thread writes those
@@ -98,7 +99,7 @@ fn render_and_write(
     })
 }
 
-fn jobs(args: &Render, field: &Field) -> Result<Vec<Job>> {
+fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
     let about = &field.about;
     let [width, height] = about.image_size;
     let cameras: Vec<(String, Camera)> = match (&args.path.cameras, args.path.orbit) {

@@ -8,7 +8,7 @@ use crate::camera::Bounds;
 use crate::camera::orbit::Orbit;
 use crate::config::Config;
 use crate::config::schedule::Budget;
-use crate::field::Needs;
+use crate::field::SceneFeatures;
 use crate::field::parameters::{FEATURES, Layout};
 use crate::field::train::State;
 use crate::field::training::STATE;
@@ -66,7 +66,7 @@ pub struct About {
     /// The scene's box in world space.
     pub bounds: Bounds,
     /// What the kernels were linked with.
-    pub needs: Needs,
+    pub needs: SceneFeatures,
     /// How the photos were read.
     pub reading: Reading,
     /// Which frames were trained on, and which were not.
@@ -146,7 +146,7 @@ impl About {
         let about: Self = serde_json::from_value(value).context("its description is not understood")?;
         about.config.validate().context("its configuration")?;
         ensure!(about.config.grid.finest > 0, "its configuration leaves grid.finest open");
-        let Needs { cascades, .. } = about.needs;
+        let SceneFeatures { cascades, .. } = about.needs;
         ensure!((1..=8).contains(&cascades), "expected 1 to 8 cascades, found {cascades}");
         ensure!(about.bounds.half.is_finite() && about.bounds.half > 0.0, "its scene box is empty");
         Ok(about)
@@ -284,7 +284,7 @@ mod tests {
         let small = r#"{"grid": {"levels": 8, "finest": 40, "log2_table": 8}, "occupancy": {"cells": 16}}"#;
         config.merge(&serde_json::from_str(small).expect("JSON")).expect("valid");
         let bounds = Bounds { center: DVec3::new(0.1, 0.2, 0.3), half: 1.5, cascades: 1, source: "x".into() };
-        let needs = Needs { alpha: true, cameras: 3, ..Needs::default() };
+        let needs = SceneFeatures { alpha: true, cameras: 3, ..SceneFeatures::default() };
         let about = About {
             format: FORMAT,
             dataset: "data/toys".into(),

@@ -3,7 +3,7 @@
 //! Parts for what a scene does not need (a lens, cascades, alpha, …) are not linked, their buffers are not
 //! allocated and their stages are not dispatched.
 
-use super::{Link, Needs, Workspace, layer, march, shared, viewing};
+use super::{Link, SceneFeatures, Workspace, layer, march, shared, viewing};
 use crate::config::{Accumulation, ColorLoss, Config};
 use crate::field::parameters::Layout;
 use crate::gpu::Gpu;
@@ -43,7 +43,7 @@ pub struct Plan {
     /// The parameters' layout.
     pub layout: Layout,
     /// What the scene needs.
-    pub needs: Needs,
+    pub needs: SceneFeatures,
     /// How matrix products are written.
     pub product: layer::Product,
     /// How the table's gradients are summed.
@@ -107,13 +107,13 @@ impl Traits {
 impl Plan {
     /// Chooses what depends on the adapter.
     #[must_use]
-    pub fn new(gpu: &Gpu, config: Config, layout: Layout, needs: Needs) -> Self {
+    pub fn new(gpu: &Gpu, config: Config, layout: Layout, needs: SceneFeatures) -> Self {
         Self::suited_to(Traits::of(gpu), config, layout, needs)
     }
 
     /// As [`Plan::new`], for an adapter that need not be there.
     #[must_use]
-    pub fn suited_to(adapter: Traits, config: Config, layout: Layout, needs: Needs) -> Self {
+    pub fn suited_to(adapter: Traits, config: Config, layout: Layout, needs: SceneFeatures) -> Self {
         let orders = adapter.is_cpu && march::kept_capacity(&config.batch) <= LONGEST_LOOP;
         let accumulation = match config.accumulation {
             Accumulation::Ordered if adapter.is_cpu && !orders => Accumulation::Fixed,

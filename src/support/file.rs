@@ -20,10 +20,23 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) ->
         writer.flush()?;
         writer.get_ref().sync_all()?;
         drop(writer);
-        temporary.persist(path)?;
+        // Its own error tells the cause in its text and as its cause.
+        temporary.persist(path).map_err(|failed| failed.error)?;
         Ok(())
     };
     attempt().with_context(|| format!("writing {}", path.display()))
+}
+
+/// Creates the folder where there is none, and tries whether files can be written to it.
+///
+/// # Errors
+/// When it cannot be created or written to.
+pub fn writable_folder(path: &Path) -> Result<()> {
+    let show = path.display();
+    std::fs::create_dir_all(path).with_context(|| format!("creating the folder {show}"))?;
+    let attempt = tempfile::Builder::new().prefix(".nerf-").tempfile_in(path);
+    attempt.with_context(|| format!("the folder {show} cannot be written to"))?;
+    Ok(())
 }
 
 fn temporary_in(folder: &Path) -> Result<tempfile::NamedTempFile> {

@@ -1,6 +1,6 @@
 //! What only rendering needs: how much of a view is in work at once, its rays and their compositing.
 
-use crate::field::{Camera, Link, Needs, Plan, Progress, Traits, Workspace};
+use crate::field::{Camera, Link, Plan, Progress, SceneFeatures, Traits, Workspace};
 use crate::gpu::Gpu;
 use crate::gpu::demand::Demand;
 use crate::gpu::pass::Stage;
@@ -41,7 +41,7 @@ impl Rounds {
 
     /// The weight of a colour. Without a bound on the colours there is none on the error of one that stands for
     /// others: in linear light every sample has its own.
-    pub(crate) fn color_weight(&self, needs: &Needs) -> f64 {
+    pub(crate) fn color_weight(&self, needs: &SceneFeatures) -> f64 {
         if needs.hdr { LEAST_WEIGHT } else { self.color_weight }
     }
 }

@@ -1,6 +1,6 @@
 //! The curves of a training.
 
-use super::log::{Interval, Log, Steps};
+use crate::run::log::{Interval, Log, Steps};
 use crate::support::chart::{Axis, Chart, Mark, Series};
 
 const TIME: &str = "seconds of training";

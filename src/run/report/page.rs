@@ -1,11 +1,11 @@
 //! The page as HTML. What comes from files is escaped by `maud`.
 
 use super::colormap::{INFERNO, gradient};
-use super::log::Start;
 use super::pictures::{ERROR_SCALE, LONGEST_SIDE};
 use super::views::{EVENLY_SPACED, Row, TestViews, WORST};
 use super::{Report, curves, distances, time};
 use crate::run::depths::{Depths, fog};
+use crate::run::log::Start;
 use crate::support::format::{duration, length, percent, short};
 use anyhow::Result;
 use maud::{DOCTYPE, Markup, PreEscaped, html};

@@ -1,7 +1,7 @@
 //! Where the time went: the stages of a step, and what is paid once.
 
-use super::log::{Log, Stages};
 use super::page::plural;
+use crate::run::log::{Log, Stages};
 use crate::support::format::duration;
 use maud::{Markup, html};
 

@@ -6,7 +6,7 @@ use crate::config::{
 };
 use crate::field::layer::Product;
 use crate::field::parameters::Layout;
-use crate::field::{Needs, Plan};
+use crate::field::{Plan, SceneFeatures};
 use crate::gpu::Gpu;
 use crate::gpu::tensor::Memory;
 use crate::verify::reference::Transmittance;
@@ -18,7 +18,7 @@ pub struct Setup {
     /// Sizes and constants of the field.
     pub config: Config,
     /// What the scene needs.
-    pub needs: Needs,
+    pub needs: SceneFeatures,
     /// Cells per axis of the grid's finest level.
     pub finest: u32,
     /// How matrix products are written; `None` as the plan chooses.
@@ -50,7 +50,7 @@ impl Setup {
             seed: SEED,
             ..Config::default()
         };
-        let needs = Needs { alpha: true, ..Needs::default() };
+        let needs = SceneFeatures { alpha: true, ..SceneFeatures::default() };
         Self { config, needs, finest: 40, product: None, memory: None }
     }
 
