@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     let field = session.load_field(&args.run)?;
     let dataset = open_to_compare(&args.dataset, &args.reading, &field.about)?;
-    let indices = frames(&field, &dataset, args.split.split(), session)?;
+    let indices = frames(&field, &dataset, args.split, session)?;
     ensure!(
         dataset.is_hdr == field.about.needs.hdr,
         "the field was trained on {} images, and {} has {} images; name the dataset it was trained on",
@@ -108,7 +108,7 @@ fn report(args: &Eval, field: &TrainedField, scores: &[Score], means: Means) -> 
         "ssim": means.ssim,
         "near_share": means.near_share,
         "background": args.background.name(),
-        "split": format!("{:?}", args.split).to_lowercase(),
+        "split": args.split.name(),
         "encoding": "sRGB, clamped to 0..1",
         "step": field.about.step,
         "seconds": field.about.seconds,
@@ -124,7 +124,7 @@ fn describe(args: &Eval, scores: &[Score], means: Means, color_space: ColorSpace
     let encoding = if color_space == ColorSpace::Linear { ", sRGB-encoded and clamped" } else { "" };
     lines.push(format!(
         "mean of {} over {}{encoding}: {:.3} dB  SSIM {:.4}, {}",
-        count(means.views, &format!("{} view", args.split.split().name())),
+        count(means.views, &format!("{} view", args.split.name())),
         args.background.name(),
         means.psnr,
         means.ssim,
