@@ -1,6 +1,7 @@
 //! Remarks on stderr.
 
 use crate::cli::Global;
+use crate::flags::spoken;
 use nerf::capture::dataset::{Dataset, Severity};
 use nerf::run::depths::fog;
 use std::io::Write;
@@ -50,8 +51,8 @@ impl Remarks {
     pub(crate) fn notes(self, dataset: &Dataset) {
         for note in &dataset.notes {
             match note.severity {
-                Severity::Note => self.say(&format!("note: {note}")),
-                Severity::Warning => self.warn(&note.message),
+                Severity::Note => self.say(&format!("note: {}", spoken(&note.message, note.remedy.as_ref()))),
+                Severity::Warning => self.warn(&spoken(&note.message, note.remedy.as_ref())),
             }
         }
     }

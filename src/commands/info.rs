@@ -6,6 +6,7 @@ mod result;
 
 use super::{Failed, Session};
 use crate::cli::info::Info;
+use crate::flags::{spoken, told};
 use crate::progress::Progress;
 use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
@@ -47,9 +48,12 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
     };
     let dataset = match Dataset::open(&args.dataset, &options) {
         Ok(dataset) => dataset,
-        Err(error) => return unreadable(args, &format!("{error:#}"), session),
+        Err(error) => return unreadable(args, &told(&error), session),
     };
     let mut report = inspect(args, &dataset, session)?;
+    for problem in &mut report.problems {
+        problem.message = spoken(&problem.message, problem.remedy.as_ref());
+    }
     report.problems.sort_by_key(|problem| problem.severity);
     session.print(&report.json(), &report.text())?;
     if let Some(path) = &args.plot {
@@ -98,7 +102,7 @@ fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, 
         .map(|&index| {
             let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
             progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
-            look.map_err(|error| Finding::error(format!("{error:#}")).about(vec![index]))
+            look.map_err(|error| Finding::error(told(&error)).about(vec![index]))
         })
         .collect();
     let (looks, failures): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);

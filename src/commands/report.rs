@@ -2,6 +2,7 @@
 
 use super::{Session, open_to_compare};
 use crate::cli::Report as Args;
+use crate::flags::told;
 use crate::outcome;
 use anyhow::{Result, ensure};
 use nerf::camera::LensKind;
@@ -65,8 +66,9 @@ fn views(args: &Args, field: &TrainedField, session: &Session<'_>) -> Result<Res
         Ok(found) => found,
         Err(error) if args.dataset.is_none() => {
             return Ok(Err(format!(
-                "The test views are not shown: their dataset could not be used ({error:#}). If it has moved, say \
+                "The test views are not shown: their dataset could not be used ({}). If it has moved, say \
                  where it is: nerf report {} --dataset DATASET",
+                told(&error),
                 args.run.display()
             )));
         }

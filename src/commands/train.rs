@@ -2,6 +2,7 @@
 
 use super::Session;
 use crate::cli::Train;
+use crate::flags::{spoken, told};
 use crate::outcome;
 use crate::progress::duration;
 use anyhow::{Context, Result};
@@ -65,7 +66,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     }
     match report {
         Ok(page) => result["report"] = json!(page.display().to_string()),
-        Err(error) => session.remarks.warn(&format!("the training is saved, but {error:#}")),
+        Err(error) => session.remarks.warn(&format!("the training is saved, but {}", told(&error))),
     }
     session.print(&result, &text)
 }
@@ -89,7 +90,7 @@ fn open(args: &Train, checkpoint: Option<&Checkpoint>, session: &Session<'_>) ->
     session.remarks.notes(&dataset);
     let findings = Survey::of(&dataset).findings;
     for finding in findings.iter().filter(|finding| finding.severity < Severity::Note) {
-        session.remarks.warn(&finding.message);
+        session.remarks.warn(&spoken(&finding.message, finding.remedy.as_ref()));
     }
     Ok(dataset)
 }

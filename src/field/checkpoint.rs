@@ -14,6 +14,7 @@ use crate::field::train::State;
 use crate::field::training::STATE;
 use crate::photo::{Reading, Split};
 use crate::support::file::write_atomically;
+use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -231,18 +232,12 @@ impl Checkpoint {
 pub fn locate(path: &Path) -> Result<PathBuf> {
     if path.is_dir() {
         let file = path.join(FILE);
-        ensure!(
-            file.is_file(),
-            "the folder {} has no {FILE}; expected the folder that `nerf train --out` wrote",
-            path.display()
-        );
+        let missing = || format!("the folder {} has no {FILE}; expected ", path.display());
+        ensure!(file.is_file(), Advised::new(missing(), Remedy::RunFolder, ""));
         return Ok(file);
     }
-    ensure!(
-        path.is_file(),
-        "{} does not exist; expected the folder that `nerf train --out` wrote, or a checkpoint in it",
-        path.display()
-    );
+    let missing = || format!("{} does not exist; expected ", path.display());
+    ensure!(path.is_file(), Advised::new(missing(), Remedy::RunFolder, ", or a checkpoint in it"));
     Ok(path.to_owned())
 }
 

@@ -5,7 +5,8 @@ use super::log_writer::LogWriter;
 use crate::config::Config;
 use crate::field::checkpoint::{self, Checkpoint};
 use crate::support::file::write_atomically;
-use anyhow::{Context, Result, bail, ensure};
+use crate::support::remedy::{Advised, Remedy};
+use anyhow::{Context, Result, bail};
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -39,13 +40,12 @@ impl RunFolder {
     pub fn find(run: &Path) -> Result<Self> {
         let path = if run.is_file() { run.parent().unwrap_or(run) } else { run };
         let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
-        ensure!(
-            [Self::CHECKPOINT, Self::LOG].into_iter().any(|file| path.join(file).is_file()),
-            "{} has neither {} nor {}; expected the folder that `nerf train --out` wrote",
-            run.display(),
-            Self::CHECKPOINT,
-            Self::LOG
-        );
+        let is_known = [Self::CHECKPOINT, Self::LOG].into_iter().any(|file| path.join(file).is_file());
+        if !is_known {
+            let (show, [checkpoint, log]) = (run.display(), [Self::CHECKPOINT, Self::LOG]);
+            let found = format!("{show} has neither {checkpoint} nor {log}; expected ");
+            bail!(Advised::new(found, Remedy::RunFolder, ""));
+        }
         Ok(Self::new(path))
     }
 
@@ -56,11 +56,8 @@ impl RunFolder {
     pub fn unused(path: &Path) -> Result<Self> {
         let folder = Self::new(path);
         if folder.is_used()? {
-            bail!(
-                "the folder {} is not empty; name another one, or add --resume to go on with the training in it, or \
-                 --overwrite to replace it",
-                path.display()
-            );
+            let found = format!("the folder {} is not empty; ", path.display());
+            bail!(Advised::new(found, Remedy::UsedFolder, ""));
         }
         Ok(folder)
     }

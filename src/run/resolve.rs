@@ -17,7 +17,8 @@ use crate::gpu::Gpu;
 use crate::photo::Reading;
 use crate::photo::color::ColorSpace;
 use crate::support::format::few;
-use anyhow::{Result, ensure};
+use crate::support::remedy::{Advised, Remedy};
+use anyhow::{Result, bail, ensure};
 use std::fmt::Display;
 use std::sync::Arc;
 
@@ -138,11 +139,10 @@ fn plan(about: &About, gpu: &Gpu) -> Plan {
 fn ended(about: About, options: &TrainOptions, gpu: &Gpu, earlier: Option<Budget>) -> Result<About> {
     let budget = options.budget(gpu.is_cpu(), earlier);
     budget.validate()?;
-    ensure!(
-        !about.config.deterministic || budget.seconds.is_none(),
-        "a deterministic training needs --steps N and no --seconds: how many steps fit into a time differs from \
-         run to run"
-    );
+    if about.config.deterministic && budget.seconds.is_some() {
+        let why = ": how many steps fit into a time differs from run to run";
+        bail!(Advised::new("a deterministic training needs ", Remedy::StepsAlone, why));
+    }
     Ok(About { dataset: options.dataset.clone(), adapter: gpu.info.name.clone(), budget, ..about })
 }
 
@@ -176,33 +176,32 @@ fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<About> 
 fn again(options: &TrainOptions, about: About, dataset: &Dataset, train: &[usize]) -> Result<About> {
     let config = options.configure(about.config.clone())?;
     let changed = About { config, ..about.clone() };
-    ensure!(
-        changed.layout() == about.layout() && changed.config.occupancy.cells == about.config.occupancy.cells,
-        "a training cannot change its grid, network or occupancy grid on --resume; leave those settings out, or \
-         start anew with --overwrite"
-    );
+    let is_same =
+        changed.layout() == about.layout() && changed.config.occupancy.cells == about.config.occupancy.cells;
+    if !is_same {
+        let found = "a training cannot change its grid, network or occupancy grid ";
+        bail!(Advised::new(found, Remedy::SameField, ""));
+    }
     let needs = about.needs.for_photos(dataset, train, &changed.config)?;
     Ok(About { needs, ..changed })
 }
 
 /// Photos must be read as before.
 fn same_reading(then: &Reading, now: &Reading) -> Result<()> {
-    let differs = |flag: &str, then: &dyn Display, now: &dyn Display| -> Result<()> {
+    let same = |setting: &'static str, then: &dyn Display, now: &dyn Display| -> Result<()> {
         let (then, now) = (then.to_string(), now.to_string());
-        ensure!(
-            then == now,
-            "the training began with {flag} {then}, and now it is {now}; leave {flag} out on --resume, or start anew \
-             with --overwrite"
-        );
+        if then != now {
+            bail!(Advised::new("", Remedy::SameReading { setting, then, now }, ""));
+        }
         Ok(())
     };
     let alpha = |reading: &Reading| format!("{:?}", reading.alpha).to_lowercase();
     let most = |reading: &Reading| reading.max_images.map_or("all".to_owned(), |most| most.to_string());
-    differs("--downscale", &then.downscale, &now.downscale)?;
-    differs("--crop", &then.crop, &now.crop)?;
-    differs("--max-images", &most(then), &most(now))?;
-    differs("--alpha", &alpha(then), &alpha(now))?;
-    differs("--invert-masks", &then.invert_masks, &now.invert_masks)
+    same("downscale", &then.downscale, &now.downscale)?;
+    same("crop", &then.crop, &now.crop)?;
+    same("max_images", &most(then), &most(now))?;
+    same("alpha", &alpha(then), &alpha(now))?;
+    same("invert_masks", &then.invert_masks, &now.invert_masks)
 }
 
 /// The frames that an earlier session used, by name.

@@ -8,11 +8,13 @@ use crate::capture::image::load_depth;
 use crate::photo::{AlphaMode, Photo, Reading};
 use crate::photo::{BitDepth, Image, Multiplied, Turn, Window, crop, nearest, reduce_any, reduce_depth};
 use crate::support::format::count;
+use crate::support::remedy::{Advised, Remedy};
 
 /// What keeps a training from beginning where masks ignore all of its photos.
-pub(crate) fn nothing_counts(photos: usize) -> String {
+pub(crate) fn nothing_counts(photos: usize) -> Advised {
     let photos = count(photos, "training photo");
-    format!("the masks ignore every pixel of all {photos}; they may be inverted: try --invert-masks")
+    let found = format!("the masks ignore every pixel of all {photos}; they may be inverted: ");
+    Advised::new(found, Remedy::InvertMasks, "")
 }
 
 /// Where a frame's pixels come from.

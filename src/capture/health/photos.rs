@@ -156,7 +156,7 @@ impl Gallery {
         let ignored: HashSet<usize> = self.which(|(_, look)| look.is_ignored).into_iter().collect();
         let nothing_is_left = !dataset.train.is_empty() && dataset.train.iter().all(|i| ignored.contains(i));
         nothing_is_left
-            .then(|| Finding::error(nothing_counts(dataset.train.len())).about(dataset.train.clone()))
+            .then(|| Finding::from(nothing_counts(dataset.train.len())).about(dataset.train.clone()))
     }
 
     /// Whether two frames, which have one pose, show different pictures.

@@ -1,5 +1,6 @@
 //! What is wrong with a dataset as it was read.
 
+use crate::flags::told;
 use nerf::capture::dataset::Dataset;
 use nerf::capture::health::Finding;
 use nerf::run::Estimate;
@@ -29,7 +30,7 @@ pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Finding> {
 pub(super) fn of_memory(estimate: &Estimate) -> Vec<Finding> {
     let assumed = "there is no adapter on this machine, which training needs: the memory is that of a GPU with the \
                    default settings; see `nerf adapters`";
-    let excess = estimate.excess.iter().map(|error| Finding::error(format!("{error:#}")));
+    let excess = estimate.excess.iter().map(|error| Finding::error(told(error)));
     excess.chain(estimate.adapter.is_none().then(|| Finding::note(assumed))).collect()
 }
 

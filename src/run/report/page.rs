@@ -99,7 +99,7 @@ fn warnings(report: &Report) -> Markup {
         @if report.facts.is_done == Some(false) {
             p.warning {
                 strong { "The training was interrupted before its end. " }
-                code { "nerf train … --resume" } " goes on with it."
+                "Resumed in its folder, it goes on from the last checkpoint."
             }
         }
         @if report.log.steps.is_empty() {
