@@ -9,13 +9,15 @@ use anyhow::{Result, ensure};
 
 /// Photos that tell how bright a linear scene is.
 const PHOTOS_FOR_GREY: usize = 8;
+pub(super) const NO_FRAME: &str = "the dataset has no frame to train on";
 
 impl SceneFeatures {
     /// What training on the training frames of `dataset` needs. A few photos of a linear dataset are decoded for it.
     ///
     /// # Errors
-    /// When photos cannot be read, or are no use to what `config` asks for.
+    /// When there is no frame to train on, a photo cannot be read, or photos are no use to what `config` asks for.
     pub fn of(dataset: &Dataset, config: &Config) -> Result<Self> {
+        ensure!(!dataset.train.is_empty(), NO_FRAME);
         Ok(Self { grey: grey(dataset)?, ..Self::of_headers(dataset, config)? })
     }
 

@@ -2,6 +2,7 @@
 
 use super::evaluate::Evaluator;
 use super::event::{Event, Observer};
+use super::features::NO_FRAME;
 use super::options::TrainOptions;
 use super::photos::TrainingPhotos;
 use crate::camera::orbit::Orbit;
@@ -110,8 +111,6 @@ impl Resolved {
         Ok(Some(evaluator))
     }
 }
-
-const NO_FRAME: &str = "the dataset has no frame to train on";
 
 impl Config {
     /// The settings for a dataset when nothing is said: those of a software adapter where `is_cpu`.

@@ -6,7 +6,7 @@ use super::views::{EVENLY_SPACED, Row, TestViews, WORST};
 use super::{Report, curves, distances, time};
 use crate::run::depths::{Depths, fog};
 use crate::run::log::Start;
-use crate::support::format::{duration, length, percent, short};
+use crate::support::format::{count, duration, length, percent, plural, short};
 use anyhow::Result;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::path::Path;
@@ -268,7 +268,7 @@ fn setting(report: &Report) -> Markup {
                 @if let Some(adapter) = adapter(report) { dt { "Adapter" } dd { (adapter) } }
                 @if let Some(driver) = latest(report, |start| start.driver.as_ref()) { dt { "Driver" } dd { (driver) } }
                 dt { "Folder" } dd { code { (facts.run) } }
-                @if let Some(count) = facts.train_views { dt { "Trained on" } dd { (count) " views" } }
+                @if let Some(views) = facts.train_views { dt { "Trained on" } dd { (count(views, "view")) } }
                 @if let Some(left_out) = left_out {
                     dt { "Left out" }
                     dd { ul { @for part in left_out { li { (part) } } }
@@ -280,8 +280,4 @@ fn setting(report: &Report) -> Markup {
             }
         }
     }
-}
-
-pub(super) fn plural<'a>(count: u64, one: &'a str, many: &'a str) -> &'a str {
-    if count == 1 { one } else { many }
 }
