@@ -10,16 +10,13 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use image::{ImageBuffer, ImageFormat, Rgb};
-use nerf::camera::{Camera, LensKind};
 use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions};
 use nerf::config::Config;
-use nerf::field::layout::finest_resolution;
 use nerf::field::train::Trainer;
-use nerf::field::views::Views;
-use nerf::field::{Field, Needs, Plan, Space};
+use nerf::field::{Field, Plan};
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::Reading;
-use nerf::run::memory::Memory;
+use nerf::run::TrainingPhotos;
 use nerf::support::format::bytes;
 use rayon::prelude::*;
 
@@ -86,27 +83,20 @@ fn load(folder: &Path, count: usize) -> Result<()> {
     let options = OpenOptions { hold_out: HoldOut::None, reading, ..OpenOptions::default() };
     let dataset = Dataset::open(folder, &options)?;
     let opened = clock.elapsed().as_secs_f64();
-    let cameras: Vec<Camera> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
     let gpu = Arc::new(Gpu::open(&adapter::choose(None)?)?);
-    let cascades = dataset.bounds.cascades;
-    let mut config = Config::preset(gpu.is_cpu(), cascades > 1)?;
-    let space = Space::from(&dataset.bounds);
-    config.grid.finest = finest_resolution(&config.grid, &space, &cameras);
-    let lenses = LensKind::among(&cameras);
-    let needs = Needs { lenses, ..Needs::default() };
-    let plan = Plan::new(&gpu, config, needs, space);
-    let memory = Memory::of_training(&plan, &cameras, dataset.stream_bytes(&dataset.train));
+    let plan = Plan::for_dataset(&gpu, &dataset, Config::for_dataset(&dataset, gpu.is_cpu())?)?;
+    let photos = TrainingPhotos::of(&dataset);
+    let memory = photos.memory(&plan);
     memory.check(&gpu, &plan)?;
     let clock = Instant::now();
-    let mut views = Views::new(&gpu, &plan, &cameras)?;
-    dataset.stream(&dataset.train, false, &mut |_, photo| views.add(&photo))?;
+    let views = photos.load(&gpu, &plan, &mut ())?;
     let loaded = clock.elapsed().as_secs_f64();
     let mut trainer = Trainer::new(Field::new(&gpu, plan)?, views)?;
     trainer.step(0.0, None)?;
     trainer.report()?;
     let sizes = dataset.train.iter().map(|&i| Ok(dataset.frames[i].path.metadata()?.len()));
     let megabytes = sizes.sum::<std::io::Result<u64>>()? as f64 / 1e6 / count as f64;
-    let [width, height] = cameras.first().map_or([0, 0], |camera| [camera.width, camera.height]);
+    let [width, height] = photos.cameras().first().map_or([0, 0], |camera| [camera.width, camera.height]);
     println!(
         "| {count} | {width}x{height} | {megabytes:.2} | {opened:.2} | {loaded:.1} | {:.1} | {} | {} | {} |",
         count as f64 / loaded,

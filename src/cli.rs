@@ -4,12 +4,14 @@ pub(crate) mod bench;
 pub(crate) mod check;
 pub(crate) mod generate;
 pub(crate) mod info;
+mod one_of;
 pub(crate) mod reading;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::capture::dataset::HoldOut;
 use nerf::config::Background;
 use nerf::photo::Split;
+use one_of::OneOf;
 use std::path::PathBuf;
 
 /// Train neural radiance fields from posed photos and render new views of them.
@@ -183,8 +185,8 @@ pub(crate) struct Eval {
     /// The dataset with the photos to compare with
     pub(crate) dataset: PathBuf,
     /// The views to compare
-    #[arg(long, value_enum, default_value = "test")]
-    pub(crate) split: SplitName,
+    #[arg(long, value_parser = splits(), default_value = "test")]
+    pub(crate) split: Split,
     /// What to put behind photo and rendering
     #[arg(long, value_enum, default_value = "black")]
     pub(crate) background: Shade,
@@ -221,17 +223,6 @@ pub(crate) enum Format {
     Png,
 }
 
-/// A split by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum SplitName {
-    /// Views that were held out
-    Test,
-    /// Views to choose settings by
-    Val,
-    /// Views that were trained on
-    Train,
-}
-
 /// What to measure over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Shade {
@@ -250,17 +241,6 @@ pub(crate) enum PictureBackground {
     Color([f32; 3]),
 }
 
-impl SplitName {
-    /// The split.
-    pub(crate) fn split(self) -> Split {
-        match self {
-            Self::Test => Split::Test,
-            Self::Val => Split::Val,
-            Self::Train => Split::Train,
-        }
-    }
-}
-
 impl Shade {
     /// Its name on the command line.
     pub(crate) fn name(self) -> &'static str {
@@ -277,6 +257,14 @@ impl Shade {
             Self::White => [1.0; 3],
         }
     }
+}
+
+fn splits() -> OneOf<Split> {
+    OneOf::named([
+        (Split::Test, "Views that were held out"),
+        (Split::Val, "Views to choose settings by"),
+        (Split::Train, "Views that were trained on"),
+    ])
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

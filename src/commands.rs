@@ -4,24 +4,24 @@ mod adapters;
 mod bench;
 mod check;
 mod eval;
-mod exam;
-mod field;
 mod generate;
 mod info;
 mod render;
 mod report;
-mod scores;
 mod train;
 
 use crate::cli::reading::Reading;
 use crate::cli::{Cli, Command, Global};
+use crate::narrator::Narrator;
 use crate::remarks::Remarks;
 use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::field::checkpoint::About;
 use nerf::gpu::{Gpu, adapter};
+use nerf::run::TrainedField;
+use nerf::support::file::writable_folder;
+use nerf::support::format::count;
 use serde_json::Value;
-use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
@@ -73,6 +73,21 @@ impl Session<'_> {
         Ok(Arc::new(gpu))
     }
 
+    /// Reads the checkpoint that `run` stands for.
+    fn load_field(&self, run: &Path) -> Result<TrainedField> {
+        let field = TrainedField::load(run)?;
+        let About { step, seconds, adapter, dataset, .. } = field.about();
+        let steps = count(*step as usize, "step");
+        let path = field.path.display();
+        self.remarks.detail(&format!("{path}: {steps} in {seconds:.1} s on {adapter}, trained on {dataset}"));
+        Ok(field)
+    }
+
+    /// Puts what a run tells into words.
+    fn narrator(&self) -> Narrator {
+        Narrator::new(self.remarks)
+    }
+
     /// Prints the result: `json` if asked for, else `text`.
     fn print(&self, json: &Value, text: &str) -> Result<()> {
         let mut out = std::io::stdout().lock();
@@ -88,19 +103,4 @@ impl Session<'_> {
 fn open_to_compare(path: &Path, reading: &Reading, about: &About) -> Result<Dataset> {
     let reading = reading.over(about.reading.clone());
     Dataset::open(path, &OpenOptions { reading, ..OpenOptions::default() })
-}
-
-/// The indices of the frames called `names`, and the names that the dataset lacks.
-fn find_frames<'a>(dataset: &Dataset, names: &'a [String]) -> (Vec<usize>, Vec<&'a str>) {
-    let frames = dataset.frames.iter().enumerate().rev();
-    let indices: HashMap<_, _> = frames.map(|(index, frame)| (frame.name.as_str(), index)).collect();
-    let mut missing = Vec::new();
-    let mut found = Vec::new();
-    for name in names {
-        match indices.get(name.as_str()) {
-            Some(&index) => found.push(index),
-            None => missing.push(name.as_str()),
-        }
-    }
-    (found, missing)
 }

@@ -3,6 +3,7 @@
 mod ranges;
 pub mod schedule;
 
+use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use serde_json::{Number, Value};
@@ -324,7 +325,9 @@ impl Config {
     /// When there is no `=`, no such key, or the value does not fit.
     pub fn set(&mut self, assignment: &str) -> Result<()> {
         let Some((path, text)) = assignment.split_once('=') else {
-            bail!("--set expects key.path=value, for example grid.levels=8; found '{assignment}'");
+            let expected =
+                format!(" expects key.path=value, for example grid.levels=8; found '{assignment}'");
+            bail!(Advised::new("", Remedy::Setting, expected));
         };
         // People write .005, which JSON does not know.
         let number = || text.parse().ok().and_then(Number::from_f64).map(Value::Number);
@@ -333,7 +336,7 @@ impl Config {
         for key in path.rsplit('.') {
             change = Value::Object([(key.to_owned(), change)].into_iter().collect());
         }
-        self.merge(&change).with_context(|| format!("in --set {assignment}"))
+        self.merge(&change).with_context(|| Advised::new("in ", Remedy::Setting, format!(" {assignment}")))
     }
 }
 

@@ -30,7 +30,7 @@ mod workspace;
 pub use capabilities::Capabilities;
 pub use capacity::{Capacity, Rounds};
 pub use constants::{RELATIVE_FLOOR, STEP_GROWTH, STEP_SHRINKAGE, dimension};
-pub use features::Needs;
+pub use features::SceneFeatures;
 pub use link::Link;
 pub use plan::Plan;
 pub use shared::{Camera, Counters, LAYOUTS, Progress, RayResult, RayTarget, Step, Tile};

@@ -30,31 +30,13 @@
 //! # A training in code
 //!
 //! ```no_run
-//! use nerf::{camera::LensKind, capture::dataset::Dataset, config::Config, gpu};
-//! use nerf::field::{Field, Needs, Plan, Space, layout, train, views::Views};
+//! use nerf::{capture::dataset::Dataset, config::Config, field::train::Trainer, gpu};
 //! use std::{path::Path, sync::Arc};
 //!
 //! # fn main() -> anyhow::Result<()> {
 //! let dataset = Dataset::open(Path::new("data/lego"), &Default::default())?;
-//! let mut images = Vec::new();
-//! dataset.stream(&dataset.train, false, &mut |_, photo| Ok(images.push(photo.image)))?;
-//! let cameras: Vec<_> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
 //! let gpu = Arc::new(gpu::Gpu::open(&gpu::adapter::choose(None)?)?);
-//! let mut config = Config::default();
-//! let space = Space::from(&dataset.bounds);
-//! config.grid.finest = layout::finest_resolution(&config.grid, &space, &cameras);
-//! let needs = Needs {
-//!     lenses: LensKind::among(&cameras),
-//!     alpha: images.iter().any(|image| image.has_alpha),
-//!     hdr: dataset.is_hdr,
-//!     ..Needs::default()
-//! };
-//! let plan = Plan::new(&gpu, config, needs, space);
-//! let mut views = Views::new(&gpu, &plan, &cameras)?;
-//! for image in images {
-//!     views.add(&image.into())?;
-//! }
-//! let mut trainer = train::Trainer::new(Field::new(&gpu, plan)?, views)?;
+//! let mut trainer = Trainer::on(&gpu, &dataset, Config::for_dataset(&dataset, gpu.is_cpu())?)?;
 //! for _ in 0..1000 {
 //!     trainer.step(1e-2, None)?;
 //! }

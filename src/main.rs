@@ -2,6 +2,9 @@
 
 mod cli;
 mod commands;
+mod flags;
+mod narrator;
+mod outcome;
 mod progress;
 mod remarks;
 
@@ -15,7 +18,7 @@ fn main() -> ExitCode {
     if is_broken_pipe(&error) {
         return ExitCode::SUCCESS;
     }
-    let message = format!("{error:#}");
+    let message = flags::told(&error);
     // Where even this cannot be written, the exit code still tells.
     if cli.global.json && !error.is::<commands::Failed>() {
         let _ = writeln!(std::io::stdout(), "{}", serde_json::json!({ "error": message }));

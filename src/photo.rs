@@ -16,6 +16,9 @@ pub use reading::{AlphaMode, Crop, Reading};
 pub(crate) use reduce::{reduce_any, reduce_depth};
 pub use split::Split;
 
+use crate::support::format::count;
+use crate::support::remedy::{Advised, Remedy};
+
 /// One frame's pixels, at the size of its camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Photo {
@@ -44,4 +47,11 @@ impl From<Image> for Photo {
     fn from(image: Image) -> Self {
         Self { image, ignored: Vec::new(), depth: Vec::new() }
     }
+}
+
+/// What keeps a training from beginning where masks ignore all of its photos.
+pub(crate) fn nothing_counts(photos: usize) -> Advised {
+    let photos = count(photos, "training photo");
+    let found = format!("the masks ignore every pixel of all {photos}; they may be inverted: ");
+    Advised::new(found, Remedy::InvertMasks, "")
 }

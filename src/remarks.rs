@@ -1,7 +1,9 @@
 //! Remarks on stderr.
 
 use crate::cli::Global;
+use crate::flags::spoken;
 use nerf::capture::dataset::{Dataset, Severity};
+use nerf::run::depths::fog;
 use std::io::Write;
 
 /// Prints remarks as far as they are wanted.
@@ -31,6 +33,13 @@ impl Remarks {
         self.say(&format!("warning: {line}"));
     }
 
+    /// Warns where a near share looks like fog.
+    pub(crate) fn fog(self, near_share: Option<f64>) {
+        if let Some(fog) = near_share.and_then(fog) {
+            self.warn(&fog);
+        }
+    }
+
     /// A line for `--verbose`.
     pub(crate) fn detail(self, line: &str) {
         if self.verbose {
@@ -42,8 +51,8 @@ impl Remarks {
     pub(crate) fn notes(self, dataset: &Dataset) {
         for note in &dataset.notes {
             match note.severity {
-                Severity::Note => self.say(&format!("note: {note}")),
-                Severity::Warning => self.warn(&note.message),
+                Severity::Note => self.say(&format!("note: {}", spoken(&note.message, note.remedy.as_ref()))),
+                Severity::Warning => self.warn(&spoken(&note.message, note.remedy.as_ref())),
             }
         }
     }

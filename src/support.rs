@@ -1,7 +1,7 @@
-//! What knows nothing of radiance fields: charts, image metrics, files, tables, numbers in words.
+//! What knows nothing of radiance fields: charts, image metrics, files, numbers and remedies in words.
 
 pub mod chart;
 pub mod file;
 pub mod format;
 pub mod metrics;
-pub mod results;
+pub mod remedy;

@@ -15,16 +15,13 @@ mod work;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Parser, ValueEnum};
-use nerf::camera::{Camera, LensKind};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::config::Config;
-use nerf::field::layout::finest_resolution;
 use nerf::field::train::{StepStats, Trainer};
-use nerf::field::views::Views;
-use nerf::field::{Field, Needs, Plan, Space};
+use nerf::field::{Field, Plan};
 use nerf::gpu::timer::Timer;
 use nerf::gpu::{Gpu, adapter};
-use nerf::photo::Image;
+use nerf::run::TrainingPhotos;
 use nerf::verify::scene;
 use report::{result, table};
 use serde::Serialize;
@@ -255,11 +252,6 @@ impl Run {
         let mut clock = Instant::now();
         let mut lap = || std::mem::replace(&mut clock, Instant::now()).elapsed().as_secs_f64();
         let dataset = Dataset::open(dataset, &OpenOptions::default())?;
-        let mut images = Vec::with_capacity(dataset.train.len());
-        dataset.stream(&dataset.train, false, &mut |_, photo| {
-            images.push(photo.image);
-            Ok(())
-        })?;
         start.dataset_seconds = lap();
         let gpu = Arc::new(Gpu::open(&adapter::choose(args.adapter.as_deref())?)?);
         start.device_seconds = lap();
@@ -269,7 +261,10 @@ impl Run {
         }
         config.validate()?;
         let learning_rate = config.optimizer.learning_rate;
-        let mut trainer = trainer(&gpu, config, &dataset, &images)?;
+        let plan = Plan::for_dataset(&gpu, &dataset, config)?;
+        let views = TrainingPhotos::of(&dataset).load(&gpu, &plan, &mut ())?;
+        start.dataset_seconds += lap();
+        let mut trainer = Trainer::new(Field::new(&gpu, plan)?, views)?;
         start.kernels_seconds = lap();
         trainer.warm_up()?;
         start.warm_up_seconds = lap();
@@ -318,22 +313,6 @@ impl Throughput {
         self.samples += block.samples;
         self.loss = block.loss;
     }
-}
-
-fn trainer(gpu: &Arc<Gpu>, mut config: Config, dataset: &Dataset, images: &[Image]) -> Result<Trainer> {
-    let cameras: Vec<Camera> = dataset.train.iter().map(|&i| dataset.frames[i].camera.clone()).collect();
-    let space = Space::from(&dataset.bounds);
-    config.grid.finest = finest_resolution(&config.grid, &space, &cameras);
-    let needs = Needs {
-        lenses: LensKind::among(&cameras),
-        alpha: images.iter().any(|image| image.has_alpha),
-        hdr: dataset.is_hdr,
-        ..Needs::default()
-    };
-    let plan = Plan::new(gpu, config, needs, space);
-    let mut views = Views::new(gpu, &plan, &cameras)?;
-    images.iter().try_for_each(|image| views.add(&image.clone().into()))?;
-    Trainer::new(Field::new(gpu, plan)?, views)
 }
 
 /// User and system time of this process, all threads together. Linux counts it in hundredths of a second.

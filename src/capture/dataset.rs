@@ -18,7 +18,7 @@ mod sidecars;
 mod splits;
 pub mod transforms;
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 use glam::DVec3;
@@ -30,7 +30,6 @@ pub use intrinsics::Intrinsics;
 pub use listing::{DepthEntry, Entry, Listing, SceneBox};
 pub use notes::{Note, Severity};
 pub use open::read_cameras;
-pub(crate) use photo::nothing_counts;
 pub use splits::{HoldOut, evenly_spaced, spread_order};
 
 /// A dataset: what is listed, what was found, and what was assumed.
@@ -116,6 +115,28 @@ impl Dataset {
             Split::Val => &self.val,
             Split::Test => &self.test,
         }
+    }
+
+    /// The cameras of some frames, in world space.
+    #[must_use]
+    pub fn cameras(&self, indices: &[usize]) -> Vec<Camera> {
+        indices.iter().map(|&index| self.frames[index].camera.clone()).collect()
+    }
+
+    /// The indices of the frames called `names`, and the names that the dataset lacks.
+    #[must_use]
+    pub fn find<'a>(&self, names: &'a [String]) -> (Vec<usize>, Vec<&'a str>) {
+        let frames = self.frames.iter().enumerate().rev();
+        let indices: HashMap<_, _> = frames.map(|(index, frame)| (frame.name.as_str(), index)).collect();
+        let mut missing = Vec::new();
+        let mut found = Vec::new();
+        for name in names {
+            match indices.get(name.as_str()) {
+                Some(&index) => found.push(index),
+                None => missing.push(name.as_str()),
+            }
+        }
+        (found, missing)
     }
 
     /// Indices of the frames, each image once: splits may share images.

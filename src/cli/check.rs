@@ -1,7 +1,14 @@
 //! What `nerf check` takes.
 
-use clap::{Args, ValueEnum};
+use super::one_of::OneOf;
+use clap::Args;
+use nerf::config::Accumulation;
+use nerf::field::layer::Product;
+use nerf::gpu::tensor::Memory;
 use std::path::PathBuf;
+
+/// Help of the choice that is left to the plan.
+const AUTO: &str = "What a training takes on this adapter";
 
 /// `nerf check`
 #[derive(Args, Debug)]
@@ -11,56 +18,44 @@ pub(crate) struct Check {
     #[arg(long, value_name = "FILE")]
     pub(crate) vectors: Option<PathBuf>,
     /// How gradients of the hash table are summed
-    #[arg(long, value_enum, default_value = "auto")]
-    pub(crate) accumulation: AccumulationName,
+    #[arg(long, value_parser = accumulations(), default_value = "auto")]
+    pub(crate) accumulation: Accumulation,
+    // Written with its path, an option is one of the values, not an argument that may be missing.
     /// Where tensors live
-    #[arg(long, value_enum, default_value = "auto")]
-    pub(crate) memory: MemoryName,
+    #[arg(long, value_parser = memories(), default_value = "auto")]
+    pub(crate) memory: std::option::Option<Memory>,
     /// How the networks are multiplied: rows per thread, or shared weights
-    #[arg(long, value_enum, default_value = "auto")]
-    pub(crate) product: ProductName,
+    #[arg(long, value_parser = products(), default_value = "auto")]
+    pub(crate) product: std::option::Option<Product>,
 }
 
-/// An accumulation by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum AccumulationName {
-    /// What a training takes on this adapter
-    Auto,
-    /// In the order of the samples, without atomics
-    Ordered,
-    /// As integers, independent of order
-    Fixed,
-    /// By float atomics
-    Float,
-    /// By compare-and-exchange
-    Exchange,
+fn accumulations() -> OneOf<Accumulation> {
+    OneOf::named([
+        (Accumulation::Auto, AUTO),
+        (Accumulation::Ordered, "In the order of the samples, without atomics"),
+        (Accumulation::Fixed, "As integers, independent of order"),
+        (Accumulation::Float, "By float atomics"),
+        (Accumulation::Exchange, "By compare-and-exchange"),
+    ])
 }
 
-/// A memory by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum MemoryName {
-    /// What a training takes on this adapter
-    Auto,
-    /// Storage buffers
-    Buffers,
-    /// Textures
-    Textures,
+fn memories() -> OneOf<Option<Memory>> {
+    let values = [
+        ("auto", AUTO, None),
+        ("buffers", "Storage buffers", Some(Memory::Buffers)),
+        ("textures", "Textures", Some(Memory::Textures)),
+    ];
+    OneOf::new(values.map(|(name, help, memory)| (name.to_owned(), help, memory)))
 }
 
-/// A matrix product by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ProductName {
-    /// What a training takes on this adapter
-    Auto,
-    /// Four rows per thread, and threads that read weights together
-    Shared,
-    /// One row per thread
-    #[value(name = "1")]
-    One,
-    /// Two rows per thread
-    #[value(name = "2")]
-    Two,
-    /// Four rows per thread
-    #[value(name = "4")]
-    Four,
+fn products() -> OneOf<Option<Product>> {
+    let product = |rows, shared_weights| Some(Product { rows, shared_weights });
+    let values = [
+        ("auto", AUTO, None),
+        ("shared", "Four rows per thread, and threads that read weights together", product(4, true)),
+        ("1", "One row per thread", product(1, false)),
+        ("2", "Two rows per thread", product(2, false)),
+        ("4", "Four rows per thread", product(4, false)),
+    ];
+    OneOf::new(values.map(|(name, help, product)| (name.to_owned(), help, product)))
 }

@@ -1,7 +1,8 @@
 //! What `nerf generate` takes.
 
+use super::one_of::OneOf;
 use super::size;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use nerf::camera::LensKind;
 use std::path::PathBuf;
 
@@ -26,9 +27,10 @@ pub(crate) struct Generate {
     /// Scene-linear OpenEXR images instead of PNG
     #[arg(long)]
     pub(crate) hdr: bool,
+    // Written with its path, a vector is one of the values, not an argument that may be repeated.
     /// Lens of the cameras; without a name, OpenCV's distortion
-    #[arg(long, value_name = "LENS", num_args = 0..=1, default_value = "pinhole", default_missing_value = "opencv")]
-    pub(crate) lens: LensChoice,
+    #[arg(long, value_name = "LENS", num_args = 0..=1, default_value = "pinhole", default_missing_value = "opencv", value_parser = lenses())]
+    pub(crate) lens: std::vec::Vec<LensKind>,
     /// Sub-rays per pixel along each axis
     #[arg(long, value_name = "N", default_value = "4")]
     pub(crate) samples: u32,
@@ -37,33 +39,15 @@ pub(crate) struct Generate {
     pub(crate) seed: u64,
 }
 
-/// The lens of generated cameras.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum LensChoice {
-    /// No distortion
-    Pinhole,
-    /// Radial and tangential distortion
-    Opencv,
-    /// OpenCV's fisheye, 180 degrees across the diagonal
-    Fisheye,
-    /// Parallel rays
-    Orthographic,
-    /// The whole sphere, for images twice as wide as high
-    Equirectangular,
-    /// All of them in turn
-    Mixed,
-}
-
-impl LensChoice {
-    /// The lenses, to be taken in turn.
-    pub(crate) fn kinds(self) -> Vec<LensKind> {
-        match self {
-            Self::Pinhole => vec![LensKind::Pinhole],
-            Self::Opencv => vec![LensKind::OpenCv],
-            Self::Fisheye => vec![LensKind::Fisheye],
-            Self::Orthographic => vec![LensKind::Orthographic],
-            Self::Equirectangular => vec![LensKind::Equirectangular],
-            Self::Mixed => LensKind::ALL.to_vec(),
-        }
-    }
+/// Kinds of lenses that cameras have in turn.
+fn lenses() -> OneOf<Vec<LensKind>> {
+    let help = |kind| match kind {
+        LensKind::Pinhole => "No distortion",
+        LensKind::OpenCv => "Radial and tangential distortion",
+        LensKind::Fisheye => "OpenCV's fisheye, 180 degrees across the diagonal",
+        LensKind::Orthographic => "Parallel rays",
+        LensKind::Equirectangular => "The whole sphere, for images twice as wide as high",
+    };
+    let one = LensKind::ALL.map(|kind| (kind.name().to_lowercase(), help(kind), vec![kind]));
+    OneOf::new(one.into_iter().chain([("mixed".to_owned(), "All of them in turn", LensKind::ALL.to_vec())]))
 }

@@ -1,6 +1,7 @@
 //! How photos are read, on the command line.
 
-use clap::{Args, ValueEnum};
+use super::one_of::OneOf;
+use clap::Args;
 use nerf::photo::{AlphaMode, Crop, Reading as Settings};
 
 /// How photos are read; what is not said stays as it is.
@@ -8,8 +9,8 @@ use nerf::photo::{AlphaMode, Crop, Reading as Settings};
 #[command(next_help_heading = "How photos are read")]
 pub(crate) struct Reading {
     /// What colours are multiplied with in photos with transparency [default: auto]
-    #[arg(long, value_enum)]
-    alpha: Option<Alpha>,
+    #[arg(long, value_parser = alphas())]
+    alpha: Option<AlphaMode>,
     /// Divide width and height by N, after --crop [default: 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     downscale: Option<u32>,
@@ -26,27 +27,19 @@ pub(crate) struct Reading {
     invert_masks: Option<bool>,
 }
 
-/// What colours are multiplied with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Alpha {
-    /// As the pixels of 8 and 16 bit files show; linear files are premultiplied
-    Auto,
-    /// Nothing
-    Straight,
-    /// Alpha
-    Premultiplied,
+fn alphas() -> OneOf<AlphaMode> {
+    OneOf::named([
+        (AlphaMode::Auto, "As the pixels of 8 and 16 bit files show; linear files are premultiplied"),
+        (AlphaMode::Straight, "Nothing"),
+        (AlphaMode::Premultiplied, "Alpha"),
+    ])
 }
 
 impl Reading {
     /// `settings`, changed as the command line says.
     pub(crate) fn over(&self, settings: Settings) -> Settings {
-        let alpha = self.alpha.map(|alpha| match alpha {
-            Alpha::Auto => AlphaMode::Auto,
-            Alpha::Straight => AlphaMode::Straight,
-            Alpha::Premultiplied => AlphaMode::Premultiplied,
-        });
         Settings {
-            alpha: alpha.unwrap_or(settings.alpha),
+            alpha: self.alpha.unwrap_or(settings.alpha),
             downscale: self.downscale.unwrap_or(settings.downscale),
             crop: self.crop.unwrap_or(settings.crop),
             max_images: self.max_images.map(|most| most as usize).or(settings.max_images),

@@ -1,12 +1,10 @@
 //! `nerf check`: every kernel on this adapter against the reference, or golden rays from a file.
 
 use super::{Failed, Session};
-use crate::cli::check::{AccumulationName, Check, MemoryName, ProductName};
+use crate::cli::check::Check;
 use crate::progress::{Progress, duration};
 use anyhow::Result;
 use nerf::config::Accumulation;
-use nerf::field::layer::Product;
-use nerf::gpu::tensor::Memory;
 use nerf::verify::check::fused::{BOUND, golden_rays};
 use nerf::verify::check::{self, Forced, Subject, Tally};
 use nerf::verify::reference::vectors::{GoldenFile, RayError};
@@ -29,27 +27,11 @@ pub(super) fn run(args: &Check, session: &Session<'_>) -> Result<()> {
 }
 
 fn forced(args: &Check) -> Forced {
-    let rows = |rows| Some(Product { rows, shared_weights: false });
+    let is_forced = args.accumulation != Accumulation::Auto;
     Forced {
-        accumulation: match args.accumulation {
-            AccumulationName::Auto => None,
-            AccumulationName::Ordered => Some(Accumulation::Ordered),
-            AccumulationName::Fixed => Some(Accumulation::Fixed),
-            AccumulationName::Float => Some(Accumulation::Float),
-            AccumulationName::Exchange => Some(Accumulation::Exchange),
-        },
-        memory: match args.memory {
-            MemoryName::Auto => None,
-            MemoryName::Buffers => Some(Memory::Buffers),
-            MemoryName::Textures => Some(Memory::Textures),
-        },
-        product: match args.product {
-            ProductName::Auto => None,
-            ProductName::Shared => Some(Product { rows: 4, shared_weights: true }),
-            ProductName::One => rows(1),
-            ProductName::Two => rows(2),
-            ProductName::Four => rows(4),
-        },
+        accumulation: is_forced.then_some(args.accumulation),
+        memory: args.memory,
+        product: args.product,
     }
 }
 

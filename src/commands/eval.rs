@@ -1,27 +1,26 @@
 //! `nerf eval`: PSNR and SSIM against photos.
 
-use super::field::Field;
-use super::scores::{Compared, Judge, Means, Score, describe_near, warn_of_fog};
-use super::{Session, find_frames, open_to_compare};
+use super::{Session, open_to_compare, writable_folder};
 use crate::cli::Eval;
+use crate::outcome::describe_near;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
 use nerf::capture::dataset::Dataset;
 use nerf::capture::image::write_png_rgba8;
 use nerf::photo::Split;
 use nerf::photo::color::{ColorSpace, opaque_srgb8};
-use nerf::support::file::writable_folder;
+use nerf::run::{Compared, Evaluator, Means, Score, TrainedField};
 use nerf::support::format::{count, few};
 use serde_json::{Value, json};
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
-    let field = Field::load(&args.run, session)?;
-    let dataset = open_to_compare(&args.dataset, &args.reading, &field.about)?;
-    let indices = frames(&field, &dataset, args.split.split(), session)?;
+    let field = session.load_field(&args.run)?;
+    let dataset = open_to_compare(&args.dataset, &args.reading, field.about())?;
+    let indices = frames(&field, &dataset, args.split, session)?;
     ensure!(
-        dataset.is_hdr == field.about.needs.hdr,
+        dataset.is_hdr == field.about().needs.hdr,
         "the field was trained on {} images, and {} has {} images; name the dataset it was trained on",
-        range(field.about.needs.hdr),
+        range(field.about().needs.hdr),
         args.dataset.display(),
         range(dataset.is_hdr)
     );
@@ -30,22 +29,22 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     }
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
-    let mut judge = Judge::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);
-    judge.background = args.background.color();
-    let scores = measure(judge, &indices, args, session)?;
+    let mut evaluator = Evaluator::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);
+    evaluator.background = args.background.color();
+    let scores = measure(evaluator, &indices, args, session)?;
     let means = Means::of(&scores).context("there was nothing to measure")?;
-    warn_of_fog(means.near_share, session.remarks);
+    session.remarks.fog(means.near_share);
     session.print(&report(args, &field, &scores, means), &describe(args, &scores, means, field.color_space()))
 }
 
 fn measure(
-    mut judge: Judge<'_>,
+    mut evaluator: Evaluator<'_>,
     indices: &[usize],
     args: &Eval,
     session: &Session<'_>,
 ) -> Result<Vec<Score>> {
     let mut scores = Vec::with_capacity(indices.len());
-    judge.each(indices, None, session.remarks, |_, compared| {
+    evaluator.each(indices, None, &mut session.narrator(), |_, compared| {
         let Compared { mut score, size: [width, height], rendered, .. } = compared;
         if let Some(folder) = &args.save {
             let file = format!("{:04}.png", scores.len());
@@ -59,9 +58,14 @@ fn measure(
 }
 
 /// The frames of a split as the training had it, else as the dataset has it.
-fn frames(field: &Field, dataset: &Dataset, split: Split, session: &Session<'_>) -> Result<Vec<usize>> {
-    let names = field.about.splits.names(split);
-    let (found, missing) = find_frames(dataset, names);
+fn frames(
+    field: &TrainedField,
+    dataset: &Dataset,
+    split: Split,
+    session: &Session<'_>,
+) -> Result<Vec<usize>> {
+    let names = field.about().splits.names(split);
+    let (found, missing) = dataset.find(names);
     if found.is_empty() {
         let indices = dataset.split(split).to_vec();
         ensure!(
@@ -89,20 +93,25 @@ fn frames(field: &Field, dataset: &Dataset, split: Split, session: &Session<'_>)
     Ok(found)
 }
 
+/// What is to be said of the number of pixels, if it is not the whole photo.
+fn remark(score: &Score) -> String {
+    score.ignored.map_or(String::new(), |pixels| format!("  without {}", count(pixels, "masked pixel")))
+}
+
 fn range(hdr: bool) -> &'static str {
     if hdr { "linear" } else { "display-referred" }
 }
 
-fn report(args: &Eval, field: &Field, scores: &[Score], means: Means) -> Value {
+fn report(args: &Eval, field: &TrainedField, scores: &[Score], means: Means) -> Value {
     json!({
         "psnr": means.psnr,
         "ssim": means.ssim,
         "near_share": means.near_share,
         "background": args.background.name(),
-        "split": format!("{:?}", args.split).to_lowercase(),
+        "split": args.split.name(),
         "encoding": "sRGB, clamped to 0..1",
-        "step": field.about.step,
-        "seconds": field.about.seconds,
+        "step": field.about().step,
+        "seconds": field.about().seconds,
         "views": scores,
     })
 }
@@ -110,12 +119,12 @@ fn report(args: &Eval, field: &Field, scores: &[Score], means: Means) -> Value {
 fn describe(args: &Eval, scores: &[Score], means: Means, color_space: ColorSpace) -> String {
     let mut lines: Vec<_> = scores
         .iter()
-        .map(|s| format!("{}  {:.3} dB  SSIM {:.4}{}", s.file, s.psnr, s.ssim, s.remark()))
+        .map(|s| format!("{}  {:.3} dB  SSIM {:.4}{}", s.file, s.psnr, s.ssim, remark(s)))
         .collect();
     let encoding = if color_space == ColorSpace::Linear { ", sRGB-encoded and clamped" } else { "" };
     lines.push(format!(
         "mean of {} over {}{encoding}: {:.3} dB  SSIM {:.4}, {}",
-        count(means.views, &format!("{} view", args.split.split().name())),
+        count(means.views, &format!("{} view", args.split.name())),
         args.background.name(),
         means.psnr,
         means.ssim,

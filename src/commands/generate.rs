@@ -18,7 +18,7 @@ pub(super) fn run(args: &Generate, session: &Session<'_>) -> Result<()> {
         views: Views::of_total(args.views).context("--views")?,
         size: args.size,
         hdr: args.hdr,
-        lenses: args.lens.kinds(),
+        lenses: args.lens.clone(),
         samples: args.samples,
         seed: args.seed,
         ..scene::Generate::new(name)

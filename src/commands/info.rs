@@ -1,20 +1,20 @@
 //! `nerf info`: what a training would make of a dataset, before it takes a night.
 
-mod memory;
 mod page;
 mod problems;
 mod result;
 
 use super::{Failed, Session};
 use crate::cli::info::Info;
+use crate::flags::{spoken, told};
 use crate::progress::Progress;
 use anyhow::Result;
-use memory::Estimate;
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::health::map;
 use nerf::capture::health::photos::{Gallery, Look};
 use nerf::capture::health::{Finding, Severity, Survey};
 use nerf::photo::Reading;
+use nerf::run::Estimate;
 use nerf::support::file::write_atomically;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -43,9 +43,12 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
     };
     let dataset = match Dataset::open(&args.dataset, &options) {
         Ok(dataset) => dataset,
-        Err(error) => return unreadable(args, &format!("{error:#}"), session),
+        Err(error) => return unreadable(args, &told(&error), session),
     };
     let mut report = inspect(args, &dataset, session)?;
+    for problem in &mut report.problems {
+        problem.message = spoken(&problem.message, problem.remedy.as_ref());
+    }
     report.problems.sort_by_key(|problem| problem.severity);
     session.print(&report.json(), &report.text())?;
     if let Some(path) = &args.plot {
@@ -75,8 +78,13 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
     problems.extend(survey.findings_with(gallery.as_ref(), dataset));
     let mut memory = None;
     if !dataset.train.is_empty() {
-        let estimate = Estimate::of(dataset, session)?;
-        problems.extend(estimate.problems());
+        // An adapter that was asked for must be there.
+        let gpu = match session.open_gpu() {
+            Err(error) if session.global.adapter.is_some() => return Err(error),
+            opened => opened.ok(),
+        };
+        let estimate = Estimate::of(dataset, gpu.as_deref())?;
+        problems.extend(problems::of_memory(&estimate));
         memory = Some(estimate);
     }
     Ok(Report { args, dataset, survey, gallery, memory, problems })
@@ -90,7 +98,7 @@ fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, 
         .map(|&index| {
             let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
             progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
-            look.map_err(|error| Finding::error(format!("{error:#}")).about(vec![index]))
+            look.map_err(|error| Finding::error(told(&error)).about(vec![index]))
         })
         .collect();
     let (looks, failures): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);

@@ -1,7 +1,6 @@
 //! `nerf render`: a trained field seen from any cameras.
 
-use super::Session;
-use super::field::Field;
+use super::{Session, writable_folder};
 use crate::cli::{Format, PictureBackground, Render};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
@@ -11,7 +10,9 @@ use nerf::capture::dataset::read_cameras;
 use nerf::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::field::render::{Renderer, View};
 use nerf::photo::color::{ColorSpace, depth_srgb8, opaque_srgb8};
-use nerf::support::file::{writable_folder, write_atomically};
+use nerf::run::TrainedField;
+use nerf::support::file::write_atomically;
+use nerf::support::format::count;
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::panic::resume_unwind;
@@ -38,18 +39,18 @@ struct Writer<'a> {
 }
 
 pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
-    let field = Field::load(&args.run, session)?;
+    let field = session.load_field(&args.run)?;
     let jobs = jobs(args, &field)?;
     writable_folder(&args.out)?;
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(jobs.iter().map(|job| &job.camera));
     let mut renderer = field.renderer(&gpu, &lenses)?;
-    let depth_range = depth_range(&field.about.bounds, &jobs);
+    let depth_range = depth_range(&field.about().bounds, &jobs);
     let writer = Writer { args, color_space: field.color_space(), depth_range };
     let progress = Progress::new(session.remarks, "rendering");
     let (frames, seconds) = render_and_write(&mut renderer, &jobs, &writer, &progress)?;
     drop(progress);
-    let mut listing = json!({ "checkpoint": field.path.display().to_string(), "step": field.about.step });
+    let mut listing = json!({ "checkpoint": field.path.display().to_string(), "step": field.about().step });
     if args.depth {
         listing["depth_near"] = json!(depth_range[0]);
         listing["depth_far"] = json!(depth_range[1]);
@@ -61,7 +62,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     })?;
     let out = args.out.display().to_string();
     let result = json!({ "out": out, "frames": jobs.len(), "seconds": seconds });
-    session.print(&result, &format!("{} frames in {out}", jobs.len()))
+    session.print(&result, &format!("{} in {out}", count(jobs.len(), "frame")))
 }
 
 /// Renders the jobs in order, describes their files, and tells the seconds that each took to render. A thread writes those
@@ -98,8 +99,8 @@ fn render_and_write(
     })
 }
 
-fn jobs(args: &Render, field: &Field) -> Result<Vec<Job>> {
-    let about = &field.about;
+fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
+    let about = field.about();
     let [width, height] = about.image_size;
     let cameras: Vec<(String, Camera)> = match (&args.path.cameras, args.path.orbit) {
         (Some(file), _) => {

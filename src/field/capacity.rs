@@ -1,6 +1,6 @@
 //! How much a step or a round of a view has room for.
 
-use super::{Capabilities, Needs};
+use super::{Capabilities, SceneFeatures};
 use crate::config::Batch;
 
 /// Room for rays and samples, which buffers are sized by.
@@ -62,7 +62,7 @@ impl Rounds {
 
     /// The weight of a colour. Without a bound on the colours there is none on the error of one that stands for
     /// others: in linear light every sample has its own.
-    pub(crate) fn color_weight(&self, needs: &Needs) -> f64 {
+    pub(crate) fn color_weight(&self, needs: &SceneFeatures) -> f64 {
         if needs.hdr { LEAST_WEIGHT } else { self.color_weight }
     }
 }

@@ -10,9 +10,10 @@ use crate::config::Config;
 use crate::config::schedule::Budget;
 use crate::field::parameters::{Array, Numbers};
 use crate::field::state::State;
-use crate::field::{Capabilities, Needs, Plan, Space};
+use crate::field::{Capabilities, Plan, SceneFeatures, Space};
 use crate::photo::{Reading, Split};
 use crate::support::file::write_atomically;
+use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -63,7 +64,7 @@ pub struct About {
     /// The scene's box in world space.
     pub bounds: Bounds,
     /// What the kernels were linked with.
-    pub needs: Needs,
+    pub needs: SceneFeatures,
     /// How the photos were read.
     pub reading: Reading,
     /// Which frames were trained on, and which were not.
@@ -217,18 +218,12 @@ impl Checkpoint {
 pub fn locate(path: &Path) -> Result<PathBuf> {
     if path.is_dir() {
         let file = path.join(FILE);
-        ensure!(
-            file.is_file(),
-            "the folder {} has no {FILE}; expected the folder that `nerf train --out` wrote",
-            path.display()
-        );
+        let missing = || format!("the folder {} has no {FILE}; expected ", path.display());
+        ensure!(file.is_file(), Advised::new(missing(), Remedy::RunFolder, ""));
         return Ok(file);
     }
-    ensure!(
-        path.is_file(),
-        "{} does not exist; expected the folder that `nerf train --out` wrote, or a checkpoint in it",
-        path.display()
-    );
+    let missing = || format!("{} does not exist; expected ", path.display());
+    ensure!(path.is_file(), Advised::new(missing(), Remedy::RunFolder, ", or a checkpoint in it"));
     Ok(path.to_owned())
 }
 
@@ -270,7 +265,7 @@ mod tests {
         let small = r#"{"grid": {"levels": 8, "finest": 40, "log2_table": 8}, "occupancy": {"cells": 16}}"#;
         config.merge(&serde_json::from_str(small).expect("JSON")).expect("valid");
         let bounds = Bounds { center: DVec3::new(0.1, 0.2, 0.3), half: 1.5, cascades: 1, source: "x".into() };
-        let needs = Needs { alpha: true, ..Needs::default() };
+        let needs = SceneFeatures { alpha: true, ..SceneFeatures::default() };
         let about = About {
             format: FORMAT,
             dataset: "data/toys".into(),

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 /// What a scene needs, apart from the configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Needs {
+pub struct SceneFeatures {
     /// The lenses that cameras have; at least one.
     pub lenses: BTreeSet<LensKind>,
     /// Some image has alpha.
@@ -23,7 +23,7 @@ pub struct Needs {
     pub grey: f32,
 }
 
-impl Default for Needs {
+impl Default for SceneFeatures {
     /// One opaque 8-bit photo of a pinhole camera.
     fn default() -> Self {
         Self {

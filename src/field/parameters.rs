@@ -238,7 +238,7 @@ mod tests {
     use super::*;
     use crate::camera::Bounds;
     use crate::config::Config;
-    use crate::field::{Capabilities, Needs};
+    use crate::field::{Capabilities, SceneFeatures};
     use glam::DVec3;
 
     #[test]
@@ -247,7 +247,7 @@ mod tests {
         config.grid.finest = 64;
         config.occupancy.cells = 16;
         let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades: 2, source: String::new() };
-        let plan = Plan::suited_to(Capabilities::GPU, config, Needs::default(), (&bounds).into());
+        let plan = Plan::suited_to(Capabilities::GPU, config, SceneFeatures::default(), (&bounds).into());
         let (entries, quads) = (plan.layout.entries, plan.layout.quads);
         let arrays: Vec<_> =
             plan.arrays().map(|array| (array.name, array.shape.clone(), array.rendered)).collect();

@@ -2,7 +2,7 @@
 //!
 use super::capacity::Rounds;
 use super::layout::Layout;
-use super::{Capabilities, Capacity, Needs, Space, layer};
+use super::{Capabilities, Capacity, SceneFeatures, Space, layer};
 use crate::camera::LensKind;
 use crate::config::{Accumulation, ColorLoss, Config};
 use crate::gpu::Gpu;
@@ -21,7 +21,7 @@ pub struct Plan {
     /// The parameters' layout.
     pub layout: Layout,
     /// What the scene needs.
-    pub needs: Needs,
+    pub needs: SceneFeatures,
     /// Where the scene is.
     pub space: Space,
     /// What there is room for.
@@ -41,13 +41,13 @@ pub struct Plan {
 impl Plan {
     /// Chooses what depends on the adapter; `grid.finest` is never 0.
     #[must_use]
-    pub fn new(gpu: &Gpu, config: Config, needs: Needs, space: Space) -> Self {
+    pub fn new(gpu: &Gpu, config: Config, needs: SceneFeatures, space: Space) -> Self {
         Self::suited_to(Capabilities::of(gpu), config, needs, space)
     }
 
     /// As [`Plan::new`], for an adapter that need not be there.
     #[must_use]
-    pub fn suited_to(adapter: Capabilities, config: Config, needs: Needs, space: Space) -> Self {
+    pub fn suited_to(adapter: Capabilities, config: Config, needs: SceneFeatures, space: Space) -> Self {
         let layout = Layout::new(&config);
         let capacity = Capacity::of_steps(&config.batch);
         let orders = adapter.is_cpu && capacity.kept <= LONGEST_LOOP;
@@ -75,7 +75,7 @@ impl Plan {
     /// The plan of a renderer of the same field for cameras with `lenses`, whose room does not depend on the training's.
     #[must_use]
     pub fn for_views(&self, lenses: &BTreeSet<LensKind>) -> Self {
-        let needs = Needs { lenses: lenses.clone(), ..self.needs.clone() };
+        let needs = SceneFeatures { lenses: lenses.clone(), ..self.needs.clone() };
         Self { needs, capacity: Capacity::of_rounds(&self.rounds), ..self.clone() }
     }
 

@@ -11,7 +11,7 @@ pub struct State {
     pub rays: u32,
     /// By how much its steps along the rays are longer than the configuration's, as a share of them.
     pub step_excess: f32,
-    /// The numbers of the plan's [arrays](Plan::arrays), in that order.
+    /// The numbers of the plan's [arrays](super::Plan::arrays), in that order.
     pub arrays: Vec<(&'static str, Numbers)>,
 }
 

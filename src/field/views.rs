@@ -2,14 +2,15 @@
 
 use super::Space;
 use crate::camera::Camera;
-use crate::capture::dataset::nothing_counts;
 use crate::field::records::{self, Record, Units};
 use crate::field::silhouette::Silhouette;
 use crate::field::{self, Plan};
 use crate::gpu::Gpu;
 use crate::gpu::banks::{Banks, Capacity, rows_of};
 use crate::photo::Photo;
-use anyhow::{Context, Result, ensure};
+use crate::photo::nothing_counts;
+use crate::support::remedy::{Advised, Remedy};
+use anyhow::{Context, Result, bail, ensure};
 use std::sync::Arc;
 
 /// Views whose photos are added one by one, so that not all of them need to be decoded at a time.
@@ -46,13 +47,15 @@ impl Views {
         let record = plan.record();
         let pixels = |camera: &Camera| camera.width as usize * camera.height as usize;
         let rows = cameras.iter().map(|camera| record.rows(pixels(camera))).sum();
-        ensure!(
-            u32::try_from(rows).is_ok() && cameras.iter().all(|camera| is_addressable(camera, record)),
-            "the photos are too large to be addressed; use --downscale 2 or --max-images {}",
-            cameras.len() / 2
-        );
-        let banks = Banks::new(gpu, records::NAME, rows, capacity)
-            .context("use --downscale 2, --crop or --max-images N to train on fewer pixels")?;
+        if u32::try_from(rows).is_err() || !cameras.iter().all(|camera| is_addressable(camera, record)) {
+            let remedy = Remedy::HalveOrThinOut { most_images: cameras.len() / 2 };
+            bail!(Advised::new("the photos are too large to be addressed; ", remedy, ""));
+        }
+        let banks = Banks::new(gpu, records::NAME, rows, capacity).context(Advised::new(
+            "",
+            Remedy::FewerPixels,
+            "",
+        ))?;
         Ok(Self {
             cameras: cameras.to_vec(),
             space: plan.space,
@@ -69,7 +72,8 @@ impl Views {
     /// Adds the photo of the next camera.
     ///
     /// # Errors
-    /// When it is not of the camera's size or of the plan's kind, there is no camera left, or the device was lost.
+    /// When it is not of the camera's size, has more to tell than the plan's features say, there is no camera left, or
+    /// the device was lost.
     pub fn add(&mut self, photo: &Photo) -> Result<()> {
         let number = self.silhouettes.len();
         let camera = self.cameras.get(number);
@@ -83,7 +87,7 @@ impl Views {
             camera.width,
             camera.height
         );
-        let records = self.record.of(photo, self.units)?;
+        let records = self.record.of(photo, self.units).with_context(|| format!("photo {number}"))?;
         self.banks.write(&self.gpu, self.row, &records)?;
         let pixel_count = (records.len() / self.record.words()) as u32;
         if pixel_count > 0 {
@@ -100,7 +104,7 @@ impl Views {
     pub(crate) fn check(&self) -> Result<()> {
         let (photos, cameras) = (self.silhouettes.len(), self.cameras.len());
         ensure!(photos == cameras, "{photos} photos were added for {cameras} cameras");
-        ensure!(!self.on_device.is_empty(), "{}", nothing_counts(photos));
+        ensure!(!self.on_device.is_empty(), nothing_counts(photos));
         Ok(())
     }
 }

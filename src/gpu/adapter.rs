@@ -1,12 +1,13 @@
 //! Listing the adapters and choosing one.
 
+use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Result, bail};
 use serde::Serialize;
 
 /// What `nerf adapters` tells of one adapter.
 #[derive(Clone, Debug, Serialize)]
 pub struct Listing {
-    /// The index that `--adapter` takes.
+    /// The index that [`choose`] takes.
     pub index: usize,
     /// The adapter's name.
     pub name: String,
@@ -130,10 +131,11 @@ pub fn choose(choice: Option<&str>) -> Result<wgpu::Adapter> {
         None => {
             let names: Vec<_> =
                 names.iter().enumerate().map(|(index, name)| format!("{index}: {name}")).collect();
-            bail!(
-                "--adapter expects an index, or parts of a name and backend; found '{choice}', and there are: {}",
-                names.join("; ")
-            )
+            let names = names.join("; ");
+            let expected = format!(
+                " expects an index, or parts of a name and backend; found '{choice}', and there are: {names}"
+            );
+            bail!(Advised::new("", Remedy::Adapter, expected))
         }
     }
 }

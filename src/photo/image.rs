@@ -73,6 +73,15 @@ impl Image {
 }
 
 impl Pixels {
+    /// Number of pixels.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Srgb8(pixels) => pixels.len(),
+            Self::Srgb16(pixels) => pixels.len(),
+            Self::Linear(pixels) => pixels.len(),
+        }
+    }
+
     /// How finely they are stored.
     pub fn bits(&self) -> BitDepth {
         match self {

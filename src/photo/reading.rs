@@ -2,10 +2,11 @@
 
 use std::fmt;
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::Window;
+use crate::support::remedy::{Advised, Remedy};
 
 /// How photos are read. A checkpoint keeps it, so that photos are measured as they were trained on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,13 +87,11 @@ impl Reading {
             self.downscale
         );
         let kept = rest.map_or(size, |(width, height)| [width, height]);
-        ensure!(
-            kept.iter().all(|&side| side >= self.downscale),
-            "--downscale {} leaves less than a pixel of {}x{}; divide by less",
-            self.downscale,
-            kept[0],
-            kept[1]
-        );
+        if kept.iter().any(|&side| side < self.downscale) {
+            let [width, height] = kept;
+            let left = format!(" leaves less than a pixel of {width}x{height}; divide by less");
+            bail!(Advised::new("", Remedy::Downscale(self.downscale), left));
+        }
         let reduced = |side: u32| {
             let nearest = (u64::from(side) + u64::from(self.downscale) / 2) / u64::from(self.downscale);
             nearest.max(1) as u32

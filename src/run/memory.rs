@@ -7,7 +7,8 @@ use crate::gpu::Gpu;
 use crate::gpu::banks::Capacity;
 use crate::gpu::demand::Demand;
 use crate::support::format::bytes;
-use anyhow::{Result, bail};
+use crate::support::remedy::{Advised, Remedy};
+use anyhow::{Result, anyhow};
 use serde::Serialize;
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
@@ -50,39 +51,44 @@ impl Memory {
         plan.check(gpu)?;
         let capacity = Capacity::of(&gpu.device.limits(), plan.memory).bytes();
         if self.photo_bytes > capacity {
-            bail!(
-                "the photos take {} on the device, and the adapter '{}' binds {} of them at most; {}",
+            let found = format!(
+                "the photos take {} on the device, and the adapter '{}' binds {} of them at most; ",
                 bytes(self.photo_bytes),
                 gpu.info.name,
                 bytes(capacity),
-                advice(self.photo_bytes, capacity)
             );
+            return Err(advised(found, self.photo_bytes, capacity));
         }
         let on_host = self.host_bytes + if gpu.is_cpu() { self.device_bytes } else { 0 };
         if let Some(available) = available_bytes().filter(|&available| available < on_host) {
             let others = on_host - self.photo_bytes;
-            bail!(
-                "the training takes {} of memory, and this machine has {} left; {}",
+            let found = format!(
+                "the training takes {} of memory, and this machine has {} left; ",
                 bytes(on_host),
                 bytes(available),
-                advice(self.photo_bytes, available.saturating_sub(others))
             );
+            return Err(advised(found, self.photo_bytes, available.saturating_sub(others)));
         }
         Ok(())
     }
 }
 
-/// What to do where the photos take more than there is for them.
-fn advice(needed: u64, available: u64) -> String {
+/// What was found, and what to do where the photos take more than there is for them.
+fn advised(found: String, needed: u64, available: u64) -> anyhow::Error {
+    match fitting(needed, available) {
+        Some(remedy) => Advised::new(found, remedy, "").into(),
+        None => anyhow!("{found}use a smaller table or batch (see configs/cpu.json), or another machine"),
+    }
+}
+
+/// How photos fit that take more than there is for them; `None` where nothing would be left of them.
+fn fitting(needed: u64, available: u64) -> Option<Remedy> {
     let ratio = needed as f64 / available.max(1) as f64;
     let downscale = ratio.sqrt().ceil();
-    if available == 0 || downscale > 64.0 {
-        return "use a smaller table or batch (see configs/cpu.json), or another machine".to_owned();
-    }
-    format!(
-        "use --downscale {downscale:.0}, or --max-images or --crop to leave {:.0} % of the pixels",
-        (100.0 / ratio).floor().max(1.0)
-    )
+    (available > 0 && downscale <= 64.0).then(|| Remedy::FittingPixels {
+        downscale: downscale as u32,
+        percent: (100.0 / ratio).floor().max(1.0) as u32,
+    })
 }
 
 /// Memory that the host can still give, within the limits of its container; `None` where the system does not tell.
@@ -109,9 +115,14 @@ mod tests {
     }
 
     #[test]
-    fn advice_makes_it_fit() {
-        assert!(advice(100, 99).starts_with("use --downscale 2,"), "{}", advice(100, 99));
-        assert!(advice(900, 100).contains("--downscale 3, or --max-images or --crop to leave 11 %"));
-        assert!(advice(900, 0).contains("another machine"));
+    fn what_is_advised_fits() {
+        let parts = |needed, available| match fitting(needed, available) {
+            Some(Remedy::FittingPixels { downscale, percent }) => Some((downscale, percent)),
+            _ => None,
+        };
+        assert_eq!(parts(100, 99), Some((2, 99)));
+        assert_eq!(parts(900, 100), Some((3, 11)));
+        assert_eq!(parts(900, 0), None);
+        assert!(advised(String::new(), 900, 0).to_string().contains("another machine"));
     }
 }

@@ -1,24 +1,25 @@
 //! The page about a training: one HTML file that needs neither network nor script.
 //!
-//! Data in, text out: the rows of `log.jsonl` ([`log`]), the scores of the test views and small pictures of some of
+//! Data in, text out: the rows of a run's log ([`log`](super::log)), the scores of the test views and small pictures of some of
 //! them ([`views`], [`pictures`]) become curves, tables and images in one page.
 
 mod colormap;
 mod curves;
 mod distances;
-pub mod log;
+mod measure;
 mod page;
 pub mod pictures;
 mod time;
 pub mod views;
 
-use anyhow::Result;
-use log::Log;
+use crate::field::checkpoint::About;
+use crate::run::log::Log;
+use crate::support::file::write_atomically;
+use anyhow::{Context, Result};
+use std::io::Write;
+use std::path::Path;
 use std::time::SystemTime;
 use views::{Outcome, TestViews};
-
-/// The page's name in the folder of a training.
-pub const FILE: &str = "report.html";
 
 /// What is known about a training; everything may be missing.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,6 +46,27 @@ pub struct Facts {
     pub settings: Option<String>,
 }
 
+impl Facts {
+    /// What the description of a field tells of the run in `folder`, at its step and seconds.
+    ///
+    /// # Errors
+    /// Never for settings that were read or resolved.
+    pub fn of(folder: &Path, about: &About) -> Result<Self> {
+        Ok(Self {
+            run: folder.display().to_string(),
+            dataset: Some(about.dataset.clone()),
+            trained: None,
+            adapter: Some(about.adapter.clone()),
+            steps: Some(u64::from(about.step)),
+            seconds: Some(about.seconds),
+            is_done: Some(about.budget.is_spent(about.step, about.seconds)),
+            train_views: Some(about.splits.train.len()),
+            hdr: about.needs.hdr,
+            settings: Some(serde_json::to_string_pretty(&about.config)?),
+        })
+    }
+}
+
 /// A training to write about.
 #[derive(Clone, Debug)]
 pub struct Report {
@@ -65,6 +87,16 @@ impl Report {
         page::page(self)
     }
 
+    /// Writes the page to a file.
+    ///
+    /// # Errors
+    /// When a chart cannot be drawn, or the file cannot be written.
+    pub fn save(&self, out: &Path) -> Result<()> {
+        let html = self.html()?;
+        write_atomically(out, |file| Ok(file.write_all(html.as_bytes())?))
+            .context("the report was not written")
+    }
+
     /// What the test views say of the field as it was left: as measured for this page, else as logged at its last
     /// step.
     #[must_use]
@@ -76,7 +108,7 @@ impl Report {
                 psnr: row.eval_psnr?,
                 ssim: row.eval_ssim?,
                 views: row.views,
-                left_out: row.views_left_out,
+                left_out: row.views_left_out.unwrap_or(0),
                 near_share: row.near_share,
             })
         };

@@ -20,7 +20,8 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) ->
         writer.flush()?;
         writer.get_ref().sync_all()?;
         drop(writer);
-        temporary.persist(path)?;
+        // Its own error tells the cause in its text and as its cause.
+        temporary.persist(path).map_err(|failed| failed.error)?;
         Ok(())
     };
     attempt().with_context(|| format!("writing {}", path.display()))

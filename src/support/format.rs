@@ -74,6 +74,12 @@ pub fn count(number: usize, thing: &str) -> String {
     if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
 }
 
+/// The words that fit a number: `one` for 1, else `many`.
+#[must_use]
+pub fn plural<'a>(number: u64, one: &'a str, many: &'a str) -> &'a str {
+    if number == 1 { one } else { many }
+}
+
 /// The first few of some names.
 #[must_use]
 pub fn few(names: &[impl AsRef<str>]) -> String {

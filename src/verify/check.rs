@@ -29,7 +29,7 @@ mod setup;
 pub mod step;
 mod subject;
 mod tally;
-mod thinned;
+pub mod thinned;
 pub mod view;
 mod workbench;
 
@@ -60,12 +60,16 @@ const CHECKS: [Check; 17] = [
     Check { name: "harmonics", run: |subject| Ok(vec![harmonics::harmonics(subject)?]) },
     Check { name: "activations", run: |subject| Ok(vec![activation::activations(subject)?]) },
     Check { name: "networks and scatter", run: |subject| networks::networks(subject, &networks::SHAPES) },
-    Check { name: "render, loss and gradient", run: fused::fused },
+    Check { name: "render, loss and gradient", run: compositing },
     Check { name: "further terms of the loss", run: loss::further_terms },
     Check { name: "Adam", run: adam::adam },
     Check { name: "occupancy", run: |subject| Ok(vec![occupancy::occupancy_update(subject)?]) },
     Check { name: "whole steps and views", run: whole },
 ];
+
+fn compositing(subject: &Subject) -> Result<Vec<Tally>> {
+    Ok([fused::fused(subject)?, vec![thinned::thinned_rays(subject)?]].concat())
+}
 
 fn whole(subject: &Subject) -> Result<Vec<Tally>> {
     let setups = step::setups();

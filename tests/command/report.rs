@@ -9,7 +9,7 @@ use nerf::camera::{Camera, Lens};
 use nerf::capture::dataset::spread_order;
 use nerf::field::render::View;
 use nerf::run::depths::{Depths, Onlookers};
-use nerf::run::report::log::Log;
+use nerf::run::log::Log;
 use nerf::run::report::pictures::{LONGEST_SIDE, Pair, Pictures};
 use nerf::run::report::views::{Outcome, TestViews, ViewScores};
 use nerf::run::report::{Facts, Report};

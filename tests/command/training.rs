@@ -2,13 +2,23 @@
 
 use crate::program::{SMOKE, checkpoint, generated, number, object, place, quietly, rows, text, train};
 use nerf::camera::LensKind;
+use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::image::read_exr_channel;
+use nerf::config::Config;
+use nerf::config::schedule::Budget;
+use nerf::field::train::Trainer;
+use nerf::gpu::{Gpu, adapter};
+use nerf::run::{
+    EvaluationAtEnd, EvaluationOptions, Event, NoTestViews, Observer, Resolved, RunFolder, TrainOptions,
+    TrainingRun,
+};
 use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 
 /// In decibels. The smoke test reaches 27.6 on a CPU adapter. With a wrong factor in the density gradient it
 /// reached 20.1, with the background behind every sample 22.3, and without the gradient of the features 19.2.
@@ -291,4 +301,89 @@ fn deterministic_trainings_are_equal_bit_for_bit() {
     let args =
         ["train", text(&TOYS), "--out", text(&run), "--deterministic", "--set", "accumulation=exchange"];
     quietly(&args).assert().code(1).stderr(contains("accumulation must be auto"));
+}
+
+/// The kinds of what a run tells; asks it to stop after so many steps.
+struct Listener {
+    told: Vec<&'static str>,
+    stop: Arc<AtomicBool>,
+    last_step: u32,
+}
+
+impl Observer for Listener {
+    fn notice(&mut self, event: &Event<'_>) {
+        let kind = match event {
+            Event::Resolved { .. } => "resolved",
+            Event::Memory(_) => "memory",
+            Event::Loading { .. } => "loading",
+            Event::Steps(taken) => {
+                self.stop.store(taken.step >= self.last_step, Ordering::Relaxed);
+                "steps"
+            }
+            Event::Evaluated { .. } => "evaluated",
+            Event::Saved { .. } => "saved",
+            Event::Ended => "ended",
+            Event::Measuring { .. } => "measuring",
+            Event::Warning(_) => "warning",
+        };
+        if self.told.last() != Some(&kind) {
+            self.told.push(kind);
+        }
+    }
+}
+
+#[test]
+fn a_run_without_a_terminal_tells_what_happens_and_stops_when_asked() {
+    let gpu = Arc::new(Gpu::open(&adapter::choose(None).expect("an adapter")).expect("it opens"));
+    let dataset = Dataset::open(&TOYS, &OpenOptions::default()).expect("a dataset");
+    let folder = RunFolder::unused(&place("library")).expect("empty");
+    let stop = Arc::new(AtomicBool::new(false));
+    let mut listener = Listener { told: Vec::new(), stop: Arc::clone(&stop), last_step: 32 };
+    let train = |end: u32, listener: &mut Listener| {
+        let budget = Budget { steps: Some(end), seconds: None };
+        let options = TrainOptions { config: Some(PathBuf::from(SMOKE)), budget, ..TrainOptions::default() };
+        let resolved = match RunFolder::to_resume(folder.path()) {
+            Ok((_, checkpoint)) => Resolved::resume(&options, &dataset, &gpu, checkpoint),
+            Err(_) => Resolved::new_run(&options, &dataset, &gpu),
+        };
+        let evaluation = EvaluationOptions { every: Some(32), at_end: EvaluationAtEnd::All };
+        let (gpu, resolved) = (Arc::clone(&gpu), resolved.expect("it fits"));
+        let run = TrainingRun { gpu, dataset: &dataset, resolved, folder: folder.clone(), evaluation };
+        let mut session = run.begin(listener).expect("it begins");
+        let end = session.train(&stop, listener).expect("it trains");
+        let views = session.evaluate(&end, listener).expect("measured");
+        let page = session.write_report(&end, Err("not asked for".to_owned())).expect("written");
+        assert!(page.is_file());
+        (end, views)
+    };
+    let (end, views) = train(64, &mut listener);
+    assert!(end.step == 32 && end.interrupted && views == Err(NoTestViews::Interrupted), "{end:?}");
+    let all = ["resolved", "memory", "loading", "steps", "evaluated", "saved", "ended"];
+    assert!(
+        listener.told.iter().filter(|kind| **kind != "steps").eq(all.iter().filter(|kind| **kind != "steps"))
+    );
+    stop.store(false, Ordering::Relaxed);
+    listener.last_step = u32::MAX;
+    let (end, views) = train(48, &mut listener);
+    assert!(end.step == 48 && !end.interrupted, "{end:?}");
+    assert_eq!(views.map(|views| views.count()), Ok(5));
+    assert_eq!(listener.told.last(), Some(&"measuring"));
+    let log = folder.log().expect("a log");
+    assert_eq!((log.starts.len(), log.damaged, log.steps.last().map(|row| row.step)), (2, 0, Some(48)));
+}
+
+#[test]
+fn a_trainer_on_a_dataset_takes_its_photos_as_they_are() {
+    let gpu = Arc::new(Gpu::open(&adapter::choose(None).expect("an adapter")).expect("it opens"));
+    let linear = generated("fog", "linear", &["--views", "12", "--size", "24", "--hdr"]);
+    for path in [&linear, &*TOYS] {
+        let dataset = Dataset::open(path, &OpenOptions::default()).expect("a dataset");
+        let mut config = Config::for_dataset(&dataset, gpu.is_cpu()).expect("a preset");
+        config.merge_file(Path::new(SMOKE)).expect("settings");
+        let mut trainer = Trainer::on(&gpu, &dataset, config).expect("a trainer");
+        let needs = &trainer.plan().needs;
+        assert_eq!((needs.hdr, needs.grey != 1.0), (dataset.is_hdr, dataset.is_hdr), "{needs:?}");
+        trainer.step(1e-2, None).expect("a step");
+        assert!(trainer.report().expect("a report").loss.is_finite());
+    }
 }

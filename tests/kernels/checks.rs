@@ -8,7 +8,7 @@ use nerf::gpu::tensor::Memory;
 use nerf::verify::check::networks::{SHAPES, Shape, networks};
 use nerf::verify::check::{
     Forced, activation, adam, exponential, fused, grid, harmonics, lens, loss, marching, occupancy, random,
-    rays, selection, step, view,
+    rays, selection, step, thinned, view,
 };
 
 use crate::bench::{modest_subject, passes, subject, subject_with};
@@ -95,6 +95,7 @@ fn networks_of_further_shapes() -> Result<()> {
 #[test]
 fn render_loss_and_gradient() -> Result<()> {
     passes(fused::fused(&subject()?)?);
+    passes(vec![thinned::thinned_rays(&subject()?)?]);
     Ok(())
 }
 
@@ -184,6 +185,7 @@ fn tensors_in_buffers() -> Result<()> {
     ]);
     passes(networks(&subject, SMALL)?);
     passes(fused::fused(&subject)?);
+    passes(vec![thinned::thinned_rays(&subject)?]);
     passes(adam::adam(&subject)?);
     passes([occupancy::occupancy_update(&subject)?]);
     passes(view::rendered_views(&subject)?);

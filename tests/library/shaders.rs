@@ -8,7 +8,7 @@ use nerf::camera::{Bounds, LensKind};
 use nerf::config::{Accumulation, Config};
 use nerf::field::layer::Product;
 use nerf::field::link::{self, Link};
-use nerf::field::{Capabilities, LAYOUTS, Needs, Plan, Space, records};
+use nerf::field::{Capabilities, LAYOUTS, Plan, SceneFeatures, Space, records};
 use nerf::gpu::banks::Capacity;
 use nerf::gpu::kernel::Layout as StructLayout;
 use nerf::gpu::source::{Linked, Source};
@@ -46,7 +46,7 @@ fn definitions(text: &str) -> Vec<String> {
 fn plan(memory: Memory, cascades: u32) -> Plan {
     let mut config = Config::default();
     config.grid.finest = 2048;
-    let needs = Needs { alpha: true, ..Needs::default() };
+    let needs = SceneFeatures { alpha: true, ..SceneFeatures::default() };
     let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades, source: String::new() };
     let product = Product { rows: 2, shared_weights: false };
     let adapter = Capabilities { memory, ..Capabilities::GPU };

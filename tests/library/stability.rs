@@ -8,7 +8,7 @@ use nerf::field::render::{Renderer, View};
 use nerf::field::state::State;
 use nerf::field::train::{StepStats, Trainer};
 use nerf::field::views::Views;
-use nerf::field::{Counters, Field, Needs, Plan, Space};
+use nerf::field::{Counters, Field, Plan, SceneFeatures, Space};
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::{Image, Pixels};
 use std::sync::Arc;
@@ -93,11 +93,11 @@ impl Scene {
         let adapter = adapter::choose(choice.as_deref()).expect("an adapter");
         let gpu = Arc::new(Gpu::open(&adapter).expect("it opens"));
         let (cameras, images, bounds) = (self.cameras(), self.images(), self.bounds());
-        let needs = Needs {
+        let needs = SceneFeatures {
             lenses: LensKind::among(&cameras),
             alpha: self.has_alpha,
             hdr: images.iter().any(Image::is_hdr),
-            ..Needs::default()
+            ..SceneFeatures::default()
         };
         let plan = Plan::new(&gpu, config, needs, Space::from(&bounds));
         let mut views = Views::new(&gpu, &plan, &cameras).expect("room");

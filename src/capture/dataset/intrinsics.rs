@@ -145,6 +145,7 @@ impl Intrinsics {
         let offset = (center_px / actual - 0.5).abs().max_element();
         if offset > 0.4 {
             remarks.push(Note {
+                remedy: None,
                 severity: Severity::Warning,
                 message: format!(
                     "the principal point {:.1}, {:.1} lies at the edge of the image of {}x{} pixels or outside; \
@@ -197,6 +198,7 @@ impl Stated {
 /// A panorama that is not twice as wide as high hardly shows the whole sphere.
 fn sphere_remark(actual: DVec2) -> Option<Note> {
     ((0.5 * actual.x / actual.y - 1.0).abs() > 0.02).then(|| Note {
+        remedy: None,
         severity: Severity::Warning,
         message: format!(
             "an equirectangular image is twice as wide as high, this one has {}x{} pixels; it is taken as the \

@@ -16,6 +16,7 @@ use crate::capture::image::{FORMATS, Header};
 use crate::photo::Reading;
 use crate::photo::{BitDepth, Turn};
 use crate::support::format::few;
+use crate::support::remedy::{Advised, Remedy};
 
 /// A listed frame and what was found of it.
 pub(super) struct Located {
@@ -182,9 +183,8 @@ fn remark_on_masks(frames: &[Frame], finder: &Finder, inverts: bool, notes: &mut
     if unmasked == all {
         finder.unmatched_masks().into_iter().for_each(|message| notes.warn(message));
         if inverts {
-            notes.warn(
-                "masks are to be inverted, but no frame has one; add the masks, or leave out --invert-masks",
-            );
+            let found = "masks are to be inverted, but no frame has one; add the masks, or ";
+            notes.advise(Severity::Warning, Advised::new(found, Remedy::LeaveMasks, ""));
         }
     }
 }

@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::fmt;
 
+use crate::support::remedy::{Advised, Remedy};
+
 /// How much a [`Note`] matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
@@ -19,6 +21,8 @@ pub struct Note {
     pub severity: Severity,
     /// The remark.
     pub message: String,
+    /// The user's choice that the remark tells of in plain words, if there is one.
+    pub remedy: Option<Remedy>,
 }
 
 impl fmt::Display for Note {
@@ -39,6 +43,7 @@ pub(crate) struct Notes {
 struct Entry {
     severity: Severity,
     message: String,
+    remedy: Option<Remedy>,
     first_frame: Option<String>,
     count: usize,
 }
@@ -52,13 +57,20 @@ impl Notes {
         self.add(Severity::Warning, message.into(), None);
     }
 
+    /// A remark with something to do about it.
+    pub(crate) fn advise(&mut self, severity: Severity, advised: Advised) {
+        let message = advised.to_string();
+        self.merge(Entry { severity, message, remedy: Some(advised.remedy), first_frame: None, count: 1 });
+    }
+
     /// A remark about one frame. Remarks that differ in numbers only become one, with the first numbers.
     pub(crate) fn frame(&mut self, severity: Severity, frame: &str, message: impl Into<String>) {
         self.add(severity, message.into(), Some(frame));
     }
 
     fn add(&mut self, severity: Severity, message: String, frame: Option<&str>) {
-        self.merge(Entry { severity, message, first_frame: frame.map(Into::into), count: 1 });
+        let first_frame = frame.map(Into::into);
+        self.merge(Entry { severity, message, remedy: None, first_frame, count: 1 });
     }
 
     fn merge(&mut self, entry: Entry) {
@@ -85,6 +97,7 @@ impl Notes {
     pub(crate) fn finish(self) -> Vec<Note> {
         let finish = |entry: Entry| Note {
             severity: entry.severity,
+            remedy: entry.remedy,
             message: match (entry.first_frame, entry.count) {
                 (None, _) => entry.message,
                 (Some(frame), 1) => format!("{frame}: {}", entry.message),

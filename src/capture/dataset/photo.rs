@@ -7,13 +7,6 @@ use super::{Dataset, Frame, look_ahead};
 use crate::capture::image::load_depth;
 use crate::photo::{AlphaMode, Photo, Reading};
 use crate::photo::{BitDepth, Image, Multiplied, Turn, Window, crop, nearest, reduce_any, reduce_depth};
-use crate::support::format::count;
-
-/// What keeps a training from beginning where masks ignore all of its photos.
-pub(crate) fn nothing_counts(photos: usize) -> String {
-    let photos = count(photos, "training photo");
-    format!("the masks ignore every pixel of all {photos}; they may be inverted: try --invert-masks")
-}
 
 /// Where a frame's pixels come from.
 #[derive(Clone, Debug)]

@@ -4,12 +4,13 @@ use anyhow::Result;
 use rayon::prelude::*;
 
 use super::Frame;
-use super::notes::Notes;
+use super::notes::{Notes, Severity};
 use super::photo::How;
 use super::splits::evenly_spaced;
 use crate::capture::scene_box::Surroundings;
 use crate::photo::{AlphaMode, Reading};
 use crate::photo::{BitDepth, Evidence, Multiplied};
+use crate::support::remedy::{Advised, Remedy};
 
 /// Images that are looked at to tell what their alpha means.
 const MOST: usize = 4;
@@ -44,10 +45,9 @@ impl Samples<'_> {
         if !evidence.into_iter().fold(Evidence::default(), Evidence::and).is_premultiplied() {
             return Ok(AlphaMode::Straight);
         }
-        notes.note(
-            "no colour is above its alpha, though the opaque pixels are bright: the colours are taken for \
-             premultiplied with alpha; if their edges come out too bright, say --alpha straight",
-        );
+        let found = "no colour is above its alpha, though the opaque pixels are bright: the colours are taken for \
+                     premultiplied with alpha; if their edges come out too bright, ";
+        notes.advise(Severity::Note, Advised::new(found, Remedy::StraightAlpha, ""));
         Ok(AlphaMode::Premultiplied)
     }
 

@@ -1,6 +1,7 @@
 //! Findings, and the numbers they are told in.
 
 use crate::capture::dataset;
+use crate::support::remedy::{Advised, Remedy};
 use serde::Serialize;
 
 /// How much a [`Finding`] matters; the worst comes first.
@@ -22,6 +23,8 @@ pub struct Finding {
     pub severity: Severity,
     /// One or two full sentences.
     pub message: String,
+    /// The user's choice that the message tells of in plain words, if there is one.
+    pub remedy: Option<Remedy>,
     /// Indices of the frames it is about; empty where it is about all.
     pub frames: Vec<usize>,
 }
@@ -29,7 +32,7 @@ pub struct Finding {
 impl Finding {
     /// A training would fail.
     pub fn error(message: impl Into<String>) -> Self {
-        Self { severity: Severity::Error, message: message.into(), frames: Vec::new() }
+        Self { severity: Severity::Error, message: message.into(), remedy: None, frames: Vec::new() }
     }
 
     /// Something that probably makes results worse.
@@ -51,10 +54,18 @@ impl Finding {
 
 impl From<&dataset::Note> for Finding {
     fn from(note: &dataset::Note) -> Self {
-        match note.severity {
+        let finding = match note.severity {
             dataset::Severity::Warning => Self::warning(&note.message),
             dataset::Severity::Note => Self::note(&note.message),
-        }
+        };
+        Self { remedy: note.remedy.clone(), ..finding }
+    }
+}
+
+impl From<Advised> for Finding {
+    /// A training would fail.
+    fn from(advised: Advised) -> Self {
+        Self { remedy: Some(advised.remedy.clone()), ..Self::error(advised.to_string()) }
     }
 }
 

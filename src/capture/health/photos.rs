@@ -3,8 +3,9 @@
 mod grey;
 
 use super::{Finding, Spread, names};
-use crate::capture::dataset::{Dataset, nothing_counts};
+use crate::capture::dataset::Dataset;
 use crate::photo::Photo;
+use crate::photo::nothing_counts;
 use crate::support::format::count;
 use grey::{Grey, THUMBNAIL};
 use std::collections::{HashMap, HashSet};
@@ -156,7 +157,7 @@ impl Gallery {
         let ignored: HashSet<usize> = self.which(|(_, look)| look.is_ignored).into_iter().collect();
         let nothing_is_left = !dataset.train.is_empty() && dataset.train.iter().all(|i| ignored.contains(i));
         nothing_is_left
-            .then(|| Finding::error(nothing_counts(dataset.train.len())).about(dataset.train.clone()))
+            .then(|| Finding::from(nothing_counts(dataset.train.len())).about(dataset.train.clone()))
     }
 
     /// Whether two frames, which have one pose, show different pictures.

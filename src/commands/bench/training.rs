@@ -5,10 +5,6 @@ mod picture;
 
 use crate::cli::bench::Training;
 use crate::commands::Session;
-use crate::commands::exam::Exam;
-use crate::commands::train::pace::Pace;
-use crate::commands::train::photos;
-use crate::commands::train::setup::{Setup, Wishes};
 use crate::progress::short;
 use anyhow::{Context, Result, ensure};
 use curve::{Curve, follow};
@@ -17,10 +13,11 @@ use nerf::config::schedule::Budget;
 use nerf::field::Field;
 use nerf::field::train::Trainer;
 use nerf::gpu::Gpu;
-use nerf::support::file::writable_folder;
-use nerf::support::results::{
+use nerf::run::results::{
     circumstances, joined, markdown, optional, quoted, write_csv, write_json, write_text,
 };
+use nerf::run::{Resolved, StepClock, Stepper, TrainOptions};
+use nerf::support::file::writable_folder;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -35,7 +32,7 @@ const CLOCK: &str = "training alone, without loading, compiling and measuring; t
 struct Entry {
     /// The stem of its config's file.
     config: String,
-    setup: Setup,
+    resolved: Resolved,
 }
 
 /// One training that was measured.
@@ -76,13 +73,13 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
             "dataset": args.dataset.display().to_string(),
             "train_views": dataset.train.len(),
             "test_views": dataset.test.len(),
-            "budget": entries.first().map(|entry| entry.setup.about.budget),
+            "budget": entries.first().map(|entry| entry.resolved.about.budget),
             "clock": CLOCK,
         }),
     );
     let mut runs = Vec::new();
     for (number, entry) in entries.iter().enumerate() {
-        let seed = entry.setup.about.config.seed;
+        let seed = entry.resolved.about.config.seed;
         session.remarks.say(&format!(
             "run {} of {}: {}, seed {seed}",
             number + 1,
@@ -119,13 +116,19 @@ fn entries(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<Entry>> 
     if seeds.is_empty() {
         seeds.push(None);
     }
-    let path = args.dataset.display().to_string();
+    let dataset_name = args.dataset.display().to_string();
     let budget = Budget { steps: args.steps, seconds: args.seconds };
     let each = configs.iter().flat_map(|config| seeds.iter().map(move |&seed| (config, seed)));
     let entry = |((name, config), seed): (&(String, Option<&Path>), Option<u32>)| {
-        let wishes =
-            Wishes { dataset: &path, config: *config, set: &args.set, seed, budget, ..Wishes::default() };
-        Ok(Entry { config: name.clone(), setup: Setup::new(&wishes, dataset, gpu, None)? })
+        let options = TrainOptions {
+            dataset: dataset_name.clone(),
+            config: config.map(Path::to_owned),
+            set: args.set.clone(),
+            seed,
+            budget,
+            ..TrainOptions::default()
+        };
+        Ok(Entry { config: name.clone(), resolved: Resolved::new_run(&options, dataset, gpu)? })
     };
     each.map(entry).collect()
 }
@@ -133,20 +136,22 @@ fn entries(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<Entry>> 
 impl Course<'_> {
     /// Trains and measures once.
     fn run(&self, entry: &Entry, session: &Session<'_>) -> Result<Run> {
-        let setup = &entry.setup;
-        photos::check_memory(setup, self.dataset, &self.gpu, session.remarks)?;
+        let resolved = &entry.resolved;
+        let mut narrator = session.narrator();
+        resolved.check_memory(&self.gpu, self.dataset, &mut narrator)?;
         let clock = Instant::now();
-        let views = photos::load(setup, self.dataset, &self.gpu, session.remarks)?;
+        let views = resolved.photos(self.dataset).load(&self.gpu, &resolved.plan, &mut narrator)?;
         let load_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let mut trainer = Trainer::new(Field::new(&self.gpu, setup.plan.clone())?, views)?;
+        let mut trainer = Trainer::new(Field::new(&self.gpu, resolved.plan.clone())?, views)?;
         trainer.warm_up()?;
-        let mut exam = Exam::new(setup, trainer.field(), self.dataset, self.views)?
-            .context("the dataset has no test views")?;
+        let evaluator = resolved.evaluator(trainer.field(), self.dataset, self.views)?;
+        let mut evaluator = evaluator.context("the dataset has no test views")?;
         let compile_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let curve = follow(Pace::new(&setup.about, trainer, 0.0), &mut exam, session.remarks)?;
-        let settings = setup.about.config.clone();
+        let stepper = Stepper::new(trainer, StepClock::new(&resolved.about, 0.0));
+        let curve = follow(stepper, &mut evaluator, &resolved.test, session.remarks)?;
+        let settings = resolved.about.config.clone();
         Ok(Run {
             config: entry.config.clone(),
             seed: settings.seed,

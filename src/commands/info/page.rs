@@ -1,10 +1,10 @@
 //! The report as text.
 
-use super::memory::Estimate;
 use super::{Report, problems};
 use nerf::capture::dataset::Frame;
 use nerf::capture::health::{Arrangement, Gaze, Severity, Spread};
 use nerf::photo::BitDepth;
+use nerf::run::Estimate;
 use nerf::support::format::{bytes, count, length, percent, point, short};
 
 /// Width of the headings at the left.

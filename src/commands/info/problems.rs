@@ -1,7 +1,9 @@
 //! What is wrong with a dataset as it was read.
 
+use crate::flags::told;
 use nerf::capture::dataset::Dataset;
 use nerf::capture::health::Finding;
+use nerf::run::Estimate;
 
 /// Number of images that are there.
 pub(super) fn found(dataset: &Dataset) -> usize {
@@ -22,6 +24,14 @@ pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Finding> {
     }
     problems.extend(dataset.notes.iter().map(Finding::from));
     problems
+}
+
+/// What does not fit into the memory, and what the estimate assumes.
+pub(super) fn of_memory(estimate: &Estimate) -> Vec<Finding> {
+    let assumed = "there is no adapter on this machine, which training needs: the memory is that of a GPU with the \
+                   default settings; see `nerf adapters`";
+    let excess = estimate.excess.iter().map(|error| Finding::error(told(error)));
+    excess.chain(estimate.adapter.is_none().then(|| Finding::note(assumed))).collect()
 }
 
 fn nothing_found(dataset: &Dataset) -> String {

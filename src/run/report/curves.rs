@@ -1,7 +1,11 @@
 //! The curves of a training.
 
-use super::log::{Interval, Log, Steps};
+use crate::run::log::{Interval, Log, Steps};
 use crate::support::chart::{Axis, Chart, Mark, Series};
+use crate::support::format;
+
+/// Width and height of a chart in pixels; the page scales it.
+pub(super) const SIZE: [u32; 2] = [440, 280];
 
 const TIME: &str = "seconds of training";
 const KEPT: &str = "kept: with colour and gradients";
@@ -22,8 +26,7 @@ fn quality(log: &Log) -> Chart {
     for count in counts {
         let rows = log.evaluations.iter().filter(|row| row.views == count);
         let points = rows.filter_map(|row| Some((row.seconds?, row.eval_psnr?))).collect();
-        let plural = if count == 1 { "" } else { "s" };
-        series.push(Series::new(&format!("{count} test view{plural}"), Mark::LinePoints, points));
+        series.push(Series::new(&format::count(count as usize, "test view"), Mark::LinePoints, points));
     }
     chart("PSNR", Axis::linear("PSNR, dB"), series)
 }

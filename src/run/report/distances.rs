@@ -1,7 +1,7 @@
 //! How far away lies what the test views show: the scale of their depth pictures, and where the opacity is.
 
 use super::colormap::{VIRIDIS, gradient};
-use super::page::CHART;
+use super::curves::SIZE;
 use super::pictures::nearness;
 use super::views::TestViews;
 use crate::run::depths::{Bin, Depths, NEAR};
@@ -47,7 +47,7 @@ pub(super) fn section(views: &TestViews) -> Result<Markup> {
             }
         });
     };
-    let [width, height] = CHART;
+    let [width, height] = SIZE;
     let svg = chart(&depths).svg(width, height)?;
     Ok(html! {
         div.charts.beside {

@@ -1,19 +1,17 @@
 //! The page as HTML. What comes from files is escaped by `maud`.
 
 use super::colormap::{INFERNO, gradient};
-use super::log::Start;
 use super::pictures::{ERROR_SCALE, LONGEST_SIDE};
 use super::views::{EVENLY_SPACED, Row, TestViews, WORST};
 use super::{Report, curves, distances, time};
 use crate::run::depths::{Depths, fog};
-use crate::support::format::{duration, length, percent, short};
+use crate::run::log::Start;
+use crate::support::format::{count, duration, length, percent, plural, short};
 use anyhow::Result;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::path::Path;
 
 const STYLE: &str = include_str!("style.css");
-/// Size of a chart, in pixels; the page scales it.
-pub(super) const CHART: [u32; 2] = [440, 280];
 /// Views that the table of scores shows unfolded.
 const UNFOLDED: usize = 12;
 /// Pictures narrower than this are enlarged with sharp pixels.
@@ -99,7 +97,7 @@ fn warnings(report: &Report) -> Markup {
         @if report.facts.is_done == Some(false) {
             p.warning {
                 strong { "The training was interrupted before its end. " }
-                code { "nerf train … --resume" } " goes on with it."
+                "Resumed in its folder, it goes on from the last checkpoint."
             }
         }
         @if report.log.steps.is_empty() {
@@ -142,7 +140,7 @@ fn figures(report: &Report) -> Markup {
 }
 
 fn charts(report: &Report) -> Result<Markup> {
-    let [width, height] = CHART;
+    let [width, height] = curves::SIZE;
     let drawn = curves::charts(&report.log).into_iter().map(|chart| chart.svg(width, height));
     let drawn = drawn.collect::<Result<Vec<_>>>()?;
     Ok(html! {
@@ -268,7 +266,7 @@ fn setting(report: &Report) -> Markup {
                 @if let Some(adapter) = adapter(report) { dt { "Adapter" } dd { (adapter) } }
                 @if let Some(driver) = latest(report, |start| start.driver.as_ref()) { dt { "Driver" } dd { (driver) } }
                 dt { "Folder" } dd { code { (facts.run) } }
-                @if let Some(count) = facts.train_views { dt { "Trained on" } dd { (count) " views" } }
+                @if let Some(views) = facts.train_views { dt { "Trained on" } dd { (count(views, "view")) } }
                 @if let Some(left_out) = left_out {
                     dt { "Left out" }
                     dd { ul { @for part in left_out { li { (part) } } }
@@ -280,8 +278,4 @@ fn setting(report: &Report) -> Markup {
             }
         }
     }
-}
-
-pub(super) fn plural<'a>(count: u64, one: &'a str, many: &'a str) -> &'a str {
-    if count == 1 { one } else { many }
 }

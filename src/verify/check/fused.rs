@@ -2,8 +2,8 @@
 
 use super::draw::Random;
 use super::hard_rays::HardRay;
-use super::thinned::thinned_rays;
 use super::{Setup, Subject, Tally, Workbench};
+use crate::field::link::group_size;
 use crate::field::{Counters, composite};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::Transmittance;
@@ -19,8 +19,6 @@ pub(super) const SAMPLES: usize = 1 << 14;
 const RAYS: usize = 1 << 12;
 /// Samples of the longest ray that can be marched: so many that plain sums would be wrong.
 const LONGEST: usize = 1 << 14;
-/// Threads per workgroup.
-const GROUP: usize = 64;
 
 /// The fused kernel, without an early stop.
 #[derive(Debug)]
@@ -120,7 +118,7 @@ impl Fused {
         bench.write("color", &colors);
         bench.set_targets(rays.iter().map(|ray| (ray.target, ray.background, 0.0)));
         // The batch may have more rays than these: the other threads find no samples.
-        spans.resize(rays.len().next_multiple_of(GROUP), [0, 0]);
+        spans.resize(rays.len().next_multiple_of(group_size()), [0, 0]);
         bench.write("kept_spans", &spans);
         let (count, kept) = (rays.len() as u32, steps.len() as u32);
         let rays_used = rays.first().map_or(0, batch_of);
@@ -146,7 +144,7 @@ pub fn golden_rays(subject: &Subject, file: &GoldenFile) -> Result<Vec<RayError>
     Ok(file.rays.iter().zip(&outputs).map(|(ray, output)| RayError::new(&ray.expect, output)).collect())
 }
 
-/// Compositing, loss and gradients of hard rays, in both conventions, and of thinned ones.
+/// Compositing, loss and gradients of hard rays, in both conventions.
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
@@ -154,7 +152,6 @@ pub fn fused(subject: &Subject) -> Result<Vec<Tally>> {
     Ok(vec![
         of_convention(subject, Transmittance::Exclusive)?,
         of_convention(subject, Transmittance::Inclusive)?,
-        thinned_rays(subject)?,
     ])
 }
 

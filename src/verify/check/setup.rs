@@ -6,7 +6,7 @@ use crate::config::{
     self, Accumulation, Batch, Config, Grid, March, Network, Occupancy, Optimizer, Selection,
 };
 use crate::field::layer::Product;
-use crate::field::{Needs, Plan, Space};
+use crate::field::{Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
 use crate::gpu::tensor::Memory;
 use crate::verify::reference::Transmittance;
@@ -19,7 +19,7 @@ pub struct Setup {
     /// Sizes and constants of the field.
     pub config: Config,
     /// What the scene needs.
-    pub needs: Needs,
+    pub needs: SceneFeatures,
     /// The scene's box.
     pub bounds: Bounds,
     /// How matrix products are written; `None` as the plan chooses.
@@ -51,7 +51,7 @@ impl Setup {
             seed: SEED,
             ..Config::default()
         };
-        let needs = Needs { alpha: true, ..Needs::default() };
+        let needs = SceneFeatures { alpha: true, ..SceneFeatures::default() };
         let bounds = Bounds { center: DVec3::splat(0.5), half: 0.5, cascades: 1, source: "unit cube".into() };
         Self { config, needs, bounds, product: None, memory: None }
     }

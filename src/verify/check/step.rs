@@ -8,7 +8,7 @@ use crate::config::{Background, Loss, Optimizer, Selection};
 use crate::field::layout::DENSITY_OUTPUTS;
 use crate::field::train::{StepStats, Trainer};
 use crate::field::views::Views;
-use crate::field::{Field, Needs, RayTarget, STEP_GROWTH, STEP_SHRINKAGE};
+use crate::field::{Field, RayTarget, STEP_GROWTH, STEP_SHRINKAGE, SceneFeatures};
 use crate::photo::Photo;
 use crate::photo::{Image, Pixels};
 use crate::verify::reference::Transmittance;
@@ -282,7 +282,7 @@ fn cameras() -> Vec<Camera> {
 
 /// About one colour with a little noise: something that a tiny field can learn. Some pixels are ignored, and of some
 /// the depth is not known.
-fn photo(random: &mut Random, camera: &Camera, needs: &Needs) -> Photo {
+fn photo(random: &mut Random, camera: &Camera, needs: &SceneFeatures) -> Photo {
     let count = camera.width * camera.height;
     let pixels = if needs.hdr {
         let pixel = |_| [4.0, 2.5, 0.5, 0.9].map(|x| (x * random.number(0.8, 1.0)) as f32);

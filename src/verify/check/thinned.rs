@@ -33,7 +33,7 @@ struct ThinnedRay {
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
-pub(super) fn thinned_rays(subject: &Subject) -> Result<Tally> {
+pub fn thinned_rays(subject: &Subject) -> Result<Tally> {
     let source = "as above; what a gap hides rounds as if it were seen";
     let mut tally = Tally::new("render, loss, gradient: thinned", BOUND, source);
     let mut random = Random::new(2);

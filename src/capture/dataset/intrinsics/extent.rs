@@ -139,7 +139,7 @@ impl Origin {
                 "; the aspect ratios differ, so the image may be cropped or rotated and the cameras wrong"
             };
         }
-        Note { severity, message }
+        Note { severity, message, remedy: None }
     }
 }
 

@@ -1,13 +1,12 @@
 //! One training, measured at times that are evenly spaced on a logarithmic axis.
 
-use crate::commands::exam::Exam;
-use crate::commands::scores::Means;
-use crate::commands::train::pace::Pace;
+use crate::narrator::Narrator;
 use crate::progress::{Progress, duration};
 use crate::remarks::Remarks;
 use anyhow::{Context, Result};
 use nerf::config::schedule::Budget;
-use nerf::run::report::log::Stage;
+use nerf::run::log::Stage;
+use nerf::run::{Evaluator, Means, Stepper};
 use serde::Serialize;
 
 /// Seconds of training up to the first measurement.
@@ -72,18 +71,23 @@ impl From<Means> for Measured {
 
 /// Trains to the end of the budget. The few views are measured at 0.1, 0.2, 0.5, 1, 2, 5, … seconds, all of them at
 /// the end; the clock of the training stands still meanwhile.
-pub(super) fn follow(mut pace: Pace, exam: &mut Exam<'_>, remarks: Remarks) -> Result<Curve> {
+pub(super) fn follow(
+    mut stepper: Stepper,
+    evaluator: &mut Evaluator<'_>,
+    test: &[usize],
+    remarks: Remarks,
+) -> Result<Curve> {
     let progress = Progress::new(remarks, "training");
     let (mut points, mut samples) = (Vec::<Point>::new(), 0);
     let (mut next_mark, mut next_loss) = (FIRST, 0.0);
     let mut loss = None;
-    while !pace.is_over() {
-        let stats = pace.block(Budget { steps: None, seconds: Some(next_mark) })?.stats;
-        let (step, seconds) = (pace.steps(), pace.seconds());
+    while !stepper.is_over() {
+        let stats = stepper.block(Budget { steps: None, seconds: Some(next_mark) })?.stats;
+        let (step, seconds) = (stepper.steps(), stepper.seconds());
         (loss, samples) = (Some(stats.loss), samples + stats.samples);
         let mut point = Point { step, seconds, loss, measured: None };
-        if seconds >= next_mark && !pace.is_over() {
-            point.measured = exam.few()?.map(Measured::from);
+        if seconds >= next_mark && !stepper.is_over() {
+            point.measured = evaluator.kept()?.map(Measured::from);
             while next_mark <= seconds {
                 next_mark = after(next_mark);
             }
@@ -92,7 +96,7 @@ pub(super) fn follow(mut pace: Pace, exam: &mut Exam<'_>, remarks: Remarks) -> R
             points.push(point);
             next_loss = seconds * BETWEEN_LOSSES;
         }
-        progress.update(pace.spent(), || {
+        progress.update(stepper.spent(), || {
             let psnr =
                 points.iter().rev().find_map(|point| point.measured).map(|measured| measured.eval_psnr);
             let psnr = psnr.map_or_else(String::new, |psnr| format!(", PSNR {psnr:.2} dB"));
@@ -100,22 +104,22 @@ pub(super) fn follow(mut pace: Pace, exam: &mut Exam<'_>, remarks: Remarks) -> R
         });
     }
     drop(progress);
-    let (step, seconds) = (pace.steps(), pace.seconds());
-    let marks = exam.all(remarks)?.context("there are no test views")?;
+    let (step, seconds) = (stepper.steps(), stepper.seconds());
+    let scores = evaluator.all(test, &mut Narrator::new(remarks))?.context("there are no test views")?;
     points.pop_if(|last| last.step == step);
     // The few once more, for the curve, and all of them.
-    let few = marks.few.filter(|few| few.views < marks.all.views);
-    let ends = few.into_iter().chain([marks.all]);
+    let few = scores.few.filter(|few| few.views < scores.all.views);
+    let ends = few.into_iter().chain([scores.all]);
     points.extend(ends.map(|means| Point { step, seconds, loss, measured: Some(means.into()) }));
     Ok(Curve {
         steps: step,
         seconds,
         samples_per_second: samples as f64 / seconds.max(1e-9),
-        psnr: marks.all.psnr,
-        ssim: marks.all.ssim,
-        views: marks.all.views,
-        timed_steps: pace.stages.steps(),
-        stages: pace.stages.per_step(),
+        psnr: scores.all.psnr,
+        ssim: scores.all.ssim,
+        views: scores.all.views,
+        timed_steps: stepper.stages().steps(),
+        stages: stepper.stages().per_step(),
         points,
     })
 }

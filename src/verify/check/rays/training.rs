@@ -4,7 +4,7 @@ use super::{DeviceRay, bounds, camera, is_close_to_a_fold};
 use crate::camera::{Camera, Lens};
 use crate::config::Background;
 use crate::field::records::Units;
-use crate::field::{self, Needs, RayTarget, dimension, rays};
+use crate::field::{self, RayTarget, SceneFeatures, dimension, rays};
 use crate::gpu::banks::ROW;
 use crate::photo::Photo;
 use crate::photo::{Image, Pixels};
@@ -50,7 +50,14 @@ struct Photos {
 pub fn training_rays(subject: &Subject) -> Result<Tally> {
     let mut tally =
         Tally::new("rays of a training", 4e-7, "a rotation, a unit vector, a product of colours round");
-    let kind = |alpha, hdr, deep, masks, depth| Needs { alpha, hdr, deep, masks, depth, ..Needs::default() };
+    let kind = |alpha, hdr, deep, masks, depth| SceneFeatures {
+        alpha,
+        hdr,
+        deep,
+        masks,
+        depth,
+        ..SceneFeatures::default()
+    };
     let kinds = [
         (Background::Black, kind(true, false, false, false, false)),
         (Background::Random, kind(true, true, false, false, true)),
@@ -62,7 +69,7 @@ pub fn training_rays(subject: &Subject) -> Result<Tally> {
         let mut setup = Setup::tiny();
         setup.config.background = background;
         let lenses = LENSES.iter().map(Lens::kind).collect();
-        setup.needs = Needs { lenses, ..needs };
+        setup.needs = SceneFeatures { lenses, ..needs };
         setup.bounds = bounds();
         let mut bench = subject.workbench(setup)?;
         let photos = Photos::upload(&mut bench, &mut Random::new(41))?;
@@ -144,7 +151,7 @@ impl Photos {
 }
 
 /// Random pixels, of which some are ignored and some have no depth.
-fn photo(random: &mut Random, (width, height): (u32, u32), needs: &Needs) -> Photo {
+fn photo(random: &mut Random, (width, height): (u32, u32), needs: &SceneFeatures) -> Photo {
     let count = width * height;
     let mut values = |most: f64| -> [f64; 4] { std::array::from_fn(|_| random.number(0.0, most)) };
     let pixels = if needs.hdr {

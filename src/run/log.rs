@@ -1,15 +1,32 @@
-//! `log.jsonl` as it was left: every field may be missing, the last line may be torn.
+//! `log.jsonl`: its rows, which are written and read alike. In a log as it was left every key may be missing, and the last
+//! line may be torn.
 
 use anyhow::{Context, Result};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use serde_json::Value;
 use std::io::ErrorKind;
 use std::path::Path;
 
+/// A row of a log: one JSON object with the keys of its fields, in their order.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum LogRow {
+    /// The beginning of a session, `"event": "start"`.
+    Start(Start),
+    /// Where the time of a step goes, `"event": "stages"`.
+    Stages(Stages),
+    /// A measurement of test views: what has `eval_psnr`, and no `event`.
+    #[serde(untagged)]
+    Evaluation(Evaluation),
+    /// A block of steps: everything else that has `step`, and no `event`.
+    #[serde(untagged)]
+    Block(Steps),
+}
+
 /// The rows of a log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Log {
-    /// Beginnings of the training, one per run of `nerf train`.
+    /// Beginnings of the training, one per session.
     pub starts: Vec<Start>,
     /// Blocks of steps.
     pub steps: Vec<Steps>,
@@ -21,8 +38,8 @@ pub struct Log {
     pub damaged: usize,
 }
 
-/// The beginning of a run.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+/// The beginning of a session.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Start {
     /// Steps taken before.
@@ -40,7 +57,7 @@ pub struct Start {
 }
 
 /// A block of steps.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Steps {
     /// Steps taken, this block included.
@@ -52,19 +69,22 @@ pub struct Steps {
     /// PSNR of the rays trained on, in decibels.
     pub psnr: Option<f64>,
     /// Rays of the block.
+    #[serde(serialize_with = "whole")]
     pub rays: Option<f64>,
     /// Samples of the block with colour and gradients.
+    #[serde(serialize_with = "whole")]
     pub samples: Option<f64>,
     /// Marched samples of the block.
+    #[serde(serialize_with = "whole")]
     pub marched: Option<f64>,
-    /// The learning rate at its end.
-    pub learning_rate: Option<f64>,
     /// Steps of the block whose gradients could not be used.
     pub skipped: u64,
+    /// The learning rate at its end.
+    pub learning_rate: Option<f64>,
 }
 
 /// A measurement of test views.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Evaluation {
     /// Steps taken.
@@ -73,20 +93,22 @@ pub struct Evaluation {
     pub seconds: Option<f64>,
     /// Mean of the views' PSNRs, in decibels.
     pub eval_psnr: Option<f64>,
-    /// Mean of the views' SSIMs.
+    /// Mean of the views' SSIMs; only measured at the end.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub eval_ssim: Option<f64>,
     /// Seconds that the measurement took.
     pub eval_seconds: Option<f64>,
     /// Number of views.
     pub views: u64,
     /// Number of test views that were not measured at the end, because it would have taken too long.
-    pub views_left_out: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub views_left_out: Option<u64>,
     /// Part of the pixels with a surface right before the camera.
     pub near_share: Option<f64>,
 }
 
 /// Where the time of a step goes.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Stages {
     /// Steps taken.
@@ -118,6 +140,30 @@ pub struct Interval<'a> {
     pub elapsed: f64,
 }
 
+/// Counts are kept as floats, which sums and quotients need, and written as the whole numbers that they are.
+fn whole<S: Serializer>(count: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
+    count.map(|count| count as u64).serialize(to)
+}
+
+impl LogRow {
+    /// The row of a line; `None` where it is of a kind that is not known.
+    ///
+    /// # Errors
+    /// When the line is torn, or a key's value is of another type.
+    pub fn parse(line: &str) -> Result<Option<Self>> {
+        let row: Value = serde_json::from_str(line)?;
+        row.as_object().context("a row is an object")?;
+        Ok(match row["event"].as_str() {
+            Some("start") => Some(Self::Start(serde_json::from_value(row)?)),
+            Some("stages") => Some(Self::Stages(serde_json::from_value(row)?)),
+            Some(_) => None,
+            None if row.get("eval_psnr").is_some() => Some(Self::Evaluation(serde_json::from_value(row)?)),
+            None if row.get("step").is_some() => Some(Self::Block(serde_json::from_value(row)?)),
+            None => None,
+        })
+    }
+}
+
 impl Log {
     /// Reads a log; one that does not exist is empty.
     ///
@@ -144,14 +190,11 @@ impl Log {
     }
 
     fn add(&mut self, line: &str) -> Result<()> {
-        let row: Value = serde_json::from_str(line)?;
-        row.as_object().context("a row is an object")?;
-        match row["event"].as_str() {
-            Some("start") => self.starts.push(serde_json::from_value(row)?),
-            Some("stages") => self.stages = Some(serde_json::from_value(row)?),
-            Some(_) => {}
-            None if row.get("eval_psnr").is_some() => self.evaluations.push(serde_json::from_value(row)?),
-            None if row.get("step").is_some() => self.steps.push(serde_json::from_value(row)?),
+        match LogRow::parse(line)? {
+            Some(LogRow::Start(row)) => self.starts.push(row),
+            Some(LogRow::Stages(row)) => self.stages = Some(row),
+            Some(LogRow::Evaluation(row)) => self.evaluations.push(row),
+            Some(LogRow::Block(row)) => self.steps.push(row),
             None => {}
         }
         Ok(())
@@ -188,5 +231,34 @@ impl Log {
     #[must_use]
     pub fn result(&self) -> Option<&Evaluation> {
         self.evaluations.iter().rev().find(|row| row.eval_ssim.is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The rows as `log.jsonl` has had them from the first version on.
+    const ROWS: [&str; 5] = [
+        r#"{"event":"start","step":0,"adapter":"a","driver":"b","left_out":["c"],"load_seconds":0.5,"compile_seconds":2.0}"#,
+        r#"{"step":16,"seconds":0.25,"loss":0.1,"psnr":null,"rays":4096,"samples":70000,"marched":80000,"skipped":0,"learning_rate":0.01}"#,
+        r#"{"step":16,"seconds":0.25,"eval_psnr":20.5,"eval_seconds":0.1,"views":4,"near_share":null}"#,
+        r#"{"step":16,"seconds":0.25,"eval_psnr":20.5,"eval_ssim":0.5,"eval_seconds":0.1,"views":4,"views_left_out":0,"near_share":0.01}"#,
+        r#"{"event":"stages","step":16,"steps":2,"stages":[{"stage":"encode","ms":1.5}]}"#,
+    ];
+
+    #[test]
+    fn rows_are_written_as_they_are_read() {
+        for text in ROWS {
+            let row = LogRow::parse(text).expect("whole").expect("known");
+            assert_eq!(serde_json::to_string(&row).expect("JSON"), text);
+        }
+    }
+
+    #[test]
+    fn torn_and_unknown_rows_are_told_apart() {
+        assert!(LogRow::parse(&ROWS[1][..30]).is_err() && LogRow::parse("[1]").is_err());
+        assert_eq!(LogRow::parse(r#"{"event":"something new"}"#).expect("whole"), None);
+        assert!(LogRow::parse(r#"{"event":"start","step":"many"}"#).is_err());
     }
 }

@@ -1,15 +1,15 @@
 //! Where the time of a training goes, from the device's timestamps.
 
-use nerf::gpu::Gpu;
-use nerf::gpu::timer::Timer;
-use nerf::run::report::log::Stage;
+use super::log::Stage;
+use crate::gpu::Gpu;
+use crate::gpu::timer::Timer;
 
 /// Of so many blocks, one is timed: its steps wait for the device each, which costs a little.
 const BLOCKS_PER_TIMED: u32 = 16;
 
 /// Times the stages of some steps.
 #[derive(Debug)]
-pub(in crate::commands) struct StageTimes {
+pub struct StageTimes {
     /// `None` where the adapter has no timestamps.
     timer: Option<Timer>,
     steps: u32,
@@ -17,29 +17,32 @@ pub(in crate::commands) struct StageTimes {
 
 impl StageTimes {
     /// Nothing was timed yet.
-    pub(in crate::commands) fn new(gpu: &Gpu) -> Self {
+    #[must_use]
+    pub fn new(gpu: &Gpu) -> Self {
         Self { timer: Timer::new(gpu).ok(), steps: 0 }
     }
 
     /// The timer for the steps of a block, if it is to be timed. Not the first one: an untrained field fills
     /// the whole box.
-    pub(in crate::commands) fn of_block(&mut self, block: u32) -> Option<&mut Self> {
+    pub(super) fn of_block(&mut self, block: u32) -> Option<&mut Self> {
         (self.timer.is_some() && block % BLOCKS_PER_TIMED == 1).then_some(self)
     }
 
     /// The timer for one step.
-    pub(in crate::commands) fn of_step(&mut self) -> Option<&mut Timer> {
+    pub(super) fn of_step(&mut self) -> Option<&mut Timer> {
         self.steps += 1;
         self.timer.as_mut()
     }
 
     /// Steps that were timed.
-    pub(in crate::commands) fn steps(&self) -> u32 {
+    #[must_use]
+    pub fn steps(&self) -> u32 {
         self.steps
     }
 
     /// Each stage's time, the longest first; none when nothing was timed.
-    pub(in crate::commands) fn per_step(&self) -> Vec<Stage> {
+    #[must_use]
+    pub fn per_step(&self) -> Vec<Stage> {
         let timer = self.timer.as_ref().filter(|_| self.steps > 0);
         let per_step = 1e3 / f64::from(self.steps.max(1));
         let mut stages: Vec<_> = timer.iter().flat_map(|timer| timer.totals()).collect();

@@ -1,0 +1,84 @@
+//! What the library advises, in the words of the command line.
+
+use anyhow::Error;
+use nerf::support::remedy::{Advised, Remedy};
+
+/// An error with its causes.
+pub(crate) fn told(error: &Error) -> String {
+    let text = format!("{error:#}");
+    match error.downcast_ref::<Advised>() {
+        Some(advised) => text.replace(&advised.to_string(), &advised.with(&words(&advised.remedy))),
+        None => text,
+    }
+}
+
+/// A message that has a remedy in plain words.
+pub(crate) fn spoken(message: &str, remedy: Option<&Remedy>) -> String {
+    match remedy {
+        Some(remedy) => message.replace(&remedy.to_string(), &words(remedy)),
+        None => message.to_owned(),
+    }
+}
+
+fn words(remedy: &Remedy) -> String {
+    match remedy {
+        Remedy::HalveOrThinOut { most_images } => {
+            format!("use --downscale 2 or --max-images {most_images}")
+        }
+        Remedy::FewerPixels => {
+            "use --downscale 2, --crop or --max-images N to train on fewer pixels".to_owned()
+        }
+        Remedy::FittingPixels { downscale, percent } => format!(
+            "use --downscale {downscale}, or --max-images or --crop to leave {percent} % of the pixels"
+        ),
+        Remedy::Downscale(by) => format!("--downscale {by}"),
+        Remedy::InvertMasks => "try --invert-masks".to_owned(),
+        Remedy::LeaveMasks => "leave out --invert-masks".to_owned(),
+        Remedy::StraightAlpha => "say --alpha straight".to_owned(),
+        Remedy::Adapter => "--adapter".to_owned(),
+        Remedy::Setting => "--set".to_owned(),
+        Remedy::StepsAlone => "--steps N and no --seconds".to_owned(),
+        Remedy::SameField => {
+            "on --resume; leave those settings out, or start anew with --overwrite".to_owned()
+        }
+        Remedy::SameReading { setting, then, now } => {
+            let flag = format!("--{}", setting.replace('_', "-"));
+            format!(
+                "the training began with {flag} {then}, and now it is {now}; leave {flag} out on --resume, or start \
+                 anew with --overwrite"
+            )
+        }
+        Remedy::UsedFolder => {
+            "name another one, or add --resume to go on with the training in it, or --overwrite to replace it"
+                .to_owned()
+        }
+        Remedy::RunFolder => "the folder that `nerf train --out` wrote".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::{Context, anyhow};
+
+    #[test]
+    fn errors_tell_flags_wherever_the_advice_is_among_their_causes() {
+        let advised = || Advised::new("", Remedy::Downscale(3), " leaves nothing");
+        let root = Error::from(advised()).context("frame 2").context("opening");
+        assert_eq!(told(&root), "opening: frame 2: --downscale 3 leaves nothing");
+        let middle = Err::<(), _>(anyhow!("no such key"))
+            .context(Advised::new("in ", Remedy::Setting, " a=1"))
+            .context("configuring");
+        assert_eq!(told(&middle.expect_err("failed")), "configuring: in --set a=1: no such key");
+        assert_eq!(told(&anyhow!("plain")), "plain");
+    }
+
+    #[test]
+    fn messages_tell_flags() {
+        let message = Advised::new("inverted? ", Remedy::InvertMasks, "").to_string();
+        assert_eq!(spoken(&message, Some(&Remedy::InvertMasks)), "inverted? try --invert-masks");
+        assert_eq!(spoken("plain", None), "plain");
+        let now = Remedy::SameReading { setting: "max_images", then: "all".into(), now: "7".into() };
+        assert!(words(&now).contains("began with --max-images all, and now it is 7; leave --max-images out"));
+    }
+}

@@ -1,0 +1,121 @@
+//! The clock of a training run: the only owner of its seconds, and what follows from them.
+
+use crate::config::Optimizer;
+use crate::config::schedule::Budget;
+use crate::field::checkpoint::About;
+
+/// Seconds of training, which pass while steps are taken and stand still otherwise, and the budget they are spent of.
+#[derive(Clone, Debug)]
+pub struct StepClock {
+    budget: Budget,
+    optimizer: Optimizer,
+    seconds: f64,
+    seconds_per_step: f64,
+    is_deterministic: bool,
+}
+
+impl StepClock {
+    /// The clock of the run that `about` describes, whose log tells of `logged` seconds: a deterministic run's checkpoint
+    /// does not tell how long it took, and a log may be lost or lag behind.
+    #[must_use]
+    pub fn new(about: &About, logged: f64) -> Self {
+        Self {
+            budget: about.budget,
+            optimizer: about.config.optimizer.clone(),
+            seconds: about.seconds.max(logged),
+            seconds_per_step: 0.0,
+            is_deterministic: about.config.deterministic,
+        }
+    }
+
+    /// Seconds of training so far, those of earlier sessions included.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    /// What a checkpoint may tell of the seconds: 0 of a deterministic run, since no two runs take the same time. The log
+    /// has them.
+    #[must_use]
+    pub fn recorded_seconds(&self) -> f64 {
+        if self.is_deterministic { 0.0 } else { self.seconds }
+    }
+
+    /// The part of the budget that is spent after `step` steps, within `[0, 1]`.
+    #[must_use]
+    pub fn spent(&self, step: u32) -> f64 {
+        self.budget.spent(step, self.seconds)
+    }
+
+    /// Whether the budget is spent after `step` steps.
+    #[must_use]
+    pub fn is_over(&self, step: u32) -> bool {
+        self.budget.is_spent(step, self.seconds)
+    }
+
+    /// Seconds until the budget is spent if it goes on as since `start`, a number of steps and seconds.
+    #[must_use]
+    pub fn remaining(&self, step: u32, start: (u32, f64)) -> f64 {
+        let (spent, earlier) = (self.spent(step), self.budget.spent(start.0, start.1));
+        (self.seconds - start.1) * (1.0 - spent) / (spent - earlier).max(1e-9)
+    }
+
+    /// The learning rate of the step after `step` steps, where `elapsed` more seconds have passed.
+    #[must_use]
+    pub fn learning_rate(&self, step: u32, elapsed: f64) -> f64 {
+        self.budget.learning_rate(&self.optimizer, step, self.seconds + elapsed)
+    }
+
+    /// The learning rate that the run began with.
+    #[must_use]
+    pub fn first_learning_rate(&self) -> f64 {
+        self.optimizer.learning_rate
+    }
+
+    /// The steps to take before looking at the clock again: at least one and at most `most`, neither beyond the budget
+    /// nor beyond `pause`.
+    #[must_use]
+    pub fn steps_until(&self, pause: Budget, step: u32, most: u32) -> u32 {
+        let until = |end: Budget| end.block(step, self.seconds, self.seconds_per_step, most);
+        until(self.budget).min(until(pause))
+    }
+
+    /// Lets `seconds` pass, in which `steps` steps were taken.
+    pub fn pass(&mut self, seconds: f64, steps: u32) {
+        self.seconds += seconds;
+        self.seconds_per_step = seconds / f64::from(steps.max(1));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clock(is_deterministic: bool) -> StepClock {
+        StepClock {
+            budget: Budget { steps: Some(100), seconds: Some(10.0) },
+            optimizer: Optimizer::default(),
+            seconds: 2.0,
+            seconds_per_step: 0.0,
+            is_deterministic,
+        }
+    }
+
+    #[test]
+    fn time_passes_with_steps() {
+        let mut clock = clock(false);
+        assert_eq!(clock.steps_until(Budget { steps: Some(20), seconds: None }, 16, 16), 4);
+        clock.pass(3.0, 2);
+        assert_eq!((clock.seconds(), clock.spent(7)), (5.0, 0.5));
+        assert_eq!(clock.steps_until(Budget::default(), 7, 16), 4, "5 seconds at 1.5 each");
+        assert!((clock.remaining(7, (0, 2.0)) - 3.0 * 0.5 / 0.3).abs() < 1e-9);
+        clock.pass(5.0, 2);
+        assert!(clock.is_over(7));
+    }
+
+    #[test]
+    fn deterministic_checkpoints_tell_no_time() {
+        assert_eq!((clock(true).recorded_seconds(), clock(true).seconds()), (0.0, 2.0));
+        assert_eq!(clock(false).recorded_seconds(), 2.0);
+    }
+}

@@ -1,0 +1,52 @@
+//! How much memory a training on a dataset would take, before anything is loaded.
+
+use super::memory::Memory;
+use super::photos::TrainingPhotos;
+use crate::capture::dataset::Dataset;
+use crate::config::Config;
+use crate::field::{Capabilities, Plan, SceneFeatures, Space};
+use crate::gpu::Gpu;
+use crate::gpu::banks::Capacity;
+use anyhow::Result;
+
+/// What a training with the settings for its adapter takes.
+#[derive(Debug)]
+pub struct Estimate {
+    /// Bytes.
+    pub memory: Memory,
+    /// The adapter; without one, the settings are those of a GPU.
+    pub adapter: Option<String>,
+    /// Whether device memory is host memory.
+    pub is_cpu: bool,
+    /// Most bytes of photos that the adapter can bind.
+    pub most_photo_bytes: Option<u64>,
+    /// Grid cells along an axis at the finest level, which follow the photos.
+    pub finest: u32,
+    /// The parts of the program that stay out.
+    pub left_out: Vec<String>,
+    /// Why it does not fit.
+    pub excess: Option<anyhow::Error>,
+}
+
+impl Estimate {
+    /// For a training on the training frames of `dataset` on `gpu`, or on a usual GPU where there is none.
+    ///
+    /// # Errors
+    /// When the settings ask for what the photos do not have.
+    pub fn of(dataset: &Dataset, gpu: Option<&Gpu>) -> Result<Self> {
+        let adapter = gpu.map_or(Capabilities::GPU, Capabilities::of);
+        let config = Config::for_dataset(dataset, adapter.is_cpu)?.with_finest(dataset);
+        let features = SceneFeatures::of_headers(dataset, &config)?;
+        let plan = Plan::suited_to(adapter, config, features, Space::from(&dataset.bounds));
+        let memory = TrainingPhotos::of(dataset).memory(&plan);
+        Ok(Self {
+            memory,
+            adapter: gpu.map(|gpu| gpu.info.name.clone()),
+            is_cpu: adapter.is_cpu,
+            most_photo_bytes: gpu.map(|gpu| Capacity::of(&gpu.device.limits(), plan.memory).bytes()),
+            finest: plan.layout.levels.last().map_or(0, |level| level.resolution),
+            left_out: plan.left_out(),
+            excess: gpu.and_then(|gpu| memory.check(gpu, &plan).err()),
+        })
+    }
+}

@@ -1,0 +1,165 @@
+//! What a run tells while it goes on: one list of events, and who listens.
+
+use super::memory::Memory;
+use super::scores::Means;
+use super::stepper::Block;
+use crate::field::Plan;
+use crate::field::checkpoint::About;
+use crate::gpu::Gpu;
+use crate::support::format::{count, few};
+use std::fmt;
+use std::path::Path;
+
+/// Listens to a run.
+pub trait Observer {
+    /// Something happened. The run waits until this returns.
+    fn notice(&mut self, event: &Event<'_>);
+}
+
+/// Nobody listens.
+impl Observer for () {
+    fn notice(&mut self, _: &Event<'_>) {}
+}
+
+/// What happened.
+#[derive(Clone, Copy, Debug)]
+pub enum Event<'a> {
+    /// It is known what is trained on which device; nothing was loaded yet.
+    Resolved {
+        /// What the run's checkpoints say, at the first step of this session.
+        about: &'a About,
+        /// How the kernels are linked.
+        plan: &'a Plan,
+        /// The device.
+        gpu: &'a Gpu,
+        /// Number of test views.
+        test_views: usize,
+    },
+    /// What the training takes of the memory, before it is taken.
+    Memory(Memory),
+    /// So many training photos are on the device.
+    Loading {
+        /// So many, from 0 on.
+        done: usize,
+        /// Of so many.
+        all: usize,
+    },
+    /// A block of steps was taken.
+    Steps(StepsTaken),
+    /// A few test views were measured after `step` steps.
+    Evaluated {
+        /// Steps taken.
+        step: u32,
+        /// What they say.
+        means: Means,
+    },
+    /// A checkpoint was written.
+    Saved {
+        /// Steps taken.
+        step: u32,
+        /// The file.
+        path: &'a Path,
+    },
+    /// The last step was taken, and saved.
+    Ended,
+    /// So many views were rendered and compared.
+    Measuring {
+        /// So many, from 0 on.
+        done: usize,
+        /// Of so many at most.
+        all: usize,
+    },
+    /// Something that probably makes results worse.
+    Warning(Warning<'a>),
+}
+
+/// A block of steps, and how far the run is after it.
+#[derive(Clone, Copy, Debug)]
+pub struct StepsTaken {
+    /// Steps taken, those of earlier sessions included.
+    pub step: u32,
+    /// Seconds of training, those of earlier sessions included.
+    pub seconds: f64,
+    /// What happened in the block, and how long it took.
+    pub block: Block,
+    /// PSNR of the rays trained on, in decibels; `None` where the loss is relative.
+    pub psnr: Option<f64>,
+    /// The part of the budget that is spent, within `[0, 1]`.
+    pub spent: f64,
+    /// Seconds of training until all of it is, if it goes on like this.
+    pub remaining: f64,
+}
+
+/// Something that probably makes results worse, as a sentence without a full stop.
+#[derive(Clone, Copy, Debug)]
+pub enum Warning<'a> {
+    /// Masks ignore every pixel of some training photos.
+    IgnoredPhotos {
+        /// The photos.
+        names: &'a [&'a str],
+        /// Number of all training photos.
+        all: usize,
+    },
+    /// The mask of a test view ignores every pixel, so it is not measured.
+    NotMeasured {
+        /// The view.
+        name: &'a str,
+    },
+    /// The rays of the last steps had no samples.
+    Empty {
+        /// Steps taken.
+        step: u32,
+    },
+    /// Steps whose gradients could not be used, for the first time in this session.
+    Skipped {
+        /// Steps taken.
+        step: u32,
+        /// How many were skipped.
+        skipped: u32,
+    },
+}
+
+impl fmt::Display for Warning<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::IgnoredPhotos { names, all } => write!(
+                f,
+                "masks ignore every pixel of {} of {all} training photos, which add nothing: {}",
+                names.len(),
+                few(names)
+            ),
+            Self::NotMeasured { name } => write!(f, "{name} is not measured: its mask ignores every pixel"),
+            Self::Empty { step } => write!(
+                f,
+                "at step {step} the rays meet nothing any more, the field has become empty; try a smaller \
+                 optimizer.learning_rate, occupancy.threshold or loss.sparsity"
+            ),
+            Self::Skipped { step, skipped } => write!(
+                f,
+                "up to step {step}, {} skipped: {} gradients were not finite or far too large; if it goes on, try a \
+                 smaller optimizer.learning_rate",
+                were(*skipped),
+                if *skipped == 1 { "its" } else { "their" }
+            ),
+        }
+    }
+}
+
+/// `1 step was`, `2 steps were`.
+fn were(steps: u32) -> String {
+    format!("{} {}", count(steps as usize, "step"), if steps == 1 { "was" } else { "were" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn warnings_are_sentences() {
+        let ignored = Warning::IgnoredPhotos { names: &["a.png"], all: 3 };
+        assert!(ignored.to_string().ends_with("1 of 3 training photos, which add nothing: a.png"));
+        let skipped = |skipped| Warning::Skipped { step: 48, skipped }.to_string();
+        assert!(skipped(1).starts_with("up to step 48, 1 step was skipped: its gradients"));
+        assert!(skipped(2).starts_with("up to step 48, 2 steps were skipped: their gradients"));
+    }
+}

@@ -1,0 +1,177 @@
+//! The folder of a run: the names in it, what may be in it before, and what is written to it.
+
+use super::log::Log;
+use super::log_writer::LogWriter;
+use crate::config::Config;
+use crate::field::checkpoint::{self, Checkpoint};
+use crate::support::file::write_atomically;
+use crate::support::remedy::{Advised, Remedy};
+use anyhow::{Context, Result, bail};
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// The folder of a run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunFolder {
+    path: PathBuf,
+}
+
+impl RunFolder {
+    /// The file with the field and the state of its training.
+    pub const CHECKPOINT: &'static str = checkpoint::FILE;
+    /// The file with a row per block of steps.
+    pub const LOG: &'static str = "log.jsonl";
+    /// The file with the resolved configuration.
+    pub const CONFIG: &'static str = "config.json";
+    /// The file with the page about the run.
+    pub const REPORT: &'static str = "report.html";
+
+    /// A folder that need not be there yet; nothing is touched.
+    #[must_use]
+    pub fn new(path: &Path) -> Self {
+        Self { path: path.to_owned() }
+    }
+
+    /// The folder that `run`, itself or a file in it, stands for.
+    ///
+    /// # Errors
+    /// When it has neither a checkpoint nor a log.
+    pub fn find(run: &Path) -> Result<Self> {
+        let path = if run.is_file() { run.parent().unwrap_or(run) } else { run };
+        let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
+        let is_known = [Self::CHECKPOINT, Self::LOG].into_iter().any(|file| path.join(file).is_file());
+        if !is_known {
+            let (show, [checkpoint, log]) = (run.display(), [Self::CHECKPOINT, Self::LOG]);
+            let found = format!("{show} has neither {checkpoint} nor {log}; expected ");
+            bail!(Advised::new(found, Remedy::RunFolder, ""));
+        }
+        Ok(Self::new(path))
+    }
+
+    /// A folder for a new run, which must not hold anything.
+    ///
+    /// # Errors
+    /// When it does, or is no folder.
+    pub fn unused(path: &Path) -> Result<Self> {
+        let folder = Self::new(path);
+        if folder.is_used()? {
+            let found = format!("the folder {} is not empty; ", path.display());
+            bail!(Advised::new(found, Remedy::UsedFolder, ""));
+        }
+        Ok(folder)
+    }
+
+    /// A folder for a new run, which replaces what an earlier one left.
+    ///
+    /// # Errors
+    /// When it is no folder.
+    pub fn to_overwrite(path: &Path) -> Result<Self> {
+        let folder = Self::new(path);
+        folder.is_used()?;
+        Ok(folder)
+    }
+
+    /// The folder of a run to go on with, and its checkpoint.
+    ///
+    /// # Errors
+    /// When there is no checkpoint, or it cannot be used.
+    pub fn to_resume(path: &Path) -> Result<(Self, Checkpoint)> {
+        let file = checkpoint::locate(path).context("there is nothing to resume")?;
+        Ok((Self::new(path), Checkpoint::load(&file)?))
+    }
+
+    fn is_used(&self) -> Result<bool> {
+        match fs::read_dir(&self.path) {
+            Ok(mut entries) => Ok(entries.next().is_some()),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
+            Err(error) => {
+                Err(error).with_context(|| format!("{} cannot be used as a folder", self.path.display()))
+            }
+        }
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where the checkpoint goes.
+    #[must_use]
+    pub fn checkpoint(&self) -> PathBuf {
+        self.path.join(Self::CHECKPOINT)
+    }
+
+    /// Where the page about the run goes.
+    #[must_use]
+    pub fn report(&self) -> PathBuf {
+        self.path.join(Self::REPORT)
+    }
+
+    /// The log as it was left; empty where there is none.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn log(&self) -> Result<Log> {
+        Log::read(&self.path.join(Self::LOG))
+    }
+
+    /// The resolved configuration as JSON; `None` where it cannot be read.
+    #[must_use]
+    pub fn config(&self) -> Option<String> {
+        fs::read_to_string(self.path.join(Self::CONFIG)).ok()
+    }
+
+    /// Replaces what an earlier run left, or goes on with it from step `resumed` on; the configuration is written, and
+    /// the log open.
+    ///
+    /// # Errors
+    /// When a file cannot be written or removed.
+    pub fn begin(&self, config: &Config, resumed: Option<u32>) -> Result<LogWriter> {
+        if resumed.is_none() {
+            for name in [Self::CHECKPOINT, Self::LOG, Self::CONFIG, Self::REPORT] {
+                remove(&self.path.join(name))?;
+            }
+        }
+        write_atomically(&self.path.join(Self::CONFIG), |file| {
+            serde_json::to_writer_pretty(&mut *file, config)?;
+            Ok(file.write_all(b"\n")?)
+        })?;
+        let log = self.path.join(Self::LOG);
+        match resumed {
+            Some(step) => LogWriter::resume(&log, step),
+            None => LogWriter::create(&log),
+        }
+    }
+}
+
+fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("removing {}", path.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_new_run_replaces_an_earlier_one_only_when_asked() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        assert!(RunFolder::find(folder.path()).is_err() && RunFolder::to_resume(folder.path()).is_err());
+        let run = RunFolder::unused(folder.path()).expect("empty");
+        fs::write(run.report(), "earlier").expect("writable");
+        fs::write(folder.path().join("notes.txt"), "kept").expect("writable");
+        assert!(RunFolder::unused(folder.path()).is_err());
+        let run = RunFolder::to_overwrite(folder.path()).expect("a folder");
+        run.begin(&Config::default(), None).expect("writable");
+        assert!(!run.report().exists() && folder.path().join("notes.txt").exists());
+        assert!(run.config().is_some_and(|text| text.contains("\"grid\"")));
+        assert_eq!(RunFolder::find(&folder.path().join(RunFolder::LOG)).expect("there"), run);
+        assert!(RunFolder::unused(&folder.path().join(RunFolder::LOG)).is_err(), "a file is no folder");
+    }
+}

@@ -1,0 +1,225 @@
+//! What is trained, on what, and for how long: options, a dataset, an adapter and an earlier run together.
+
+use super::evaluate::Evaluator;
+use super::event::{Event, Observer};
+use super::features::NO_FRAME;
+use super::options::TrainOptions;
+use super::photos::TrainingPhotos;
+use crate::camera::orbit::Orbit;
+use crate::capture::dataset::{Dataset, evenly_spaced};
+use crate::config::Config;
+use crate::config::schedule::Budget;
+use crate::field::checkpoint::{About, Checkpoint, FORMAT, Splits};
+use crate::field::layout::{Layout, finest_resolution};
+use crate::field::render::Renderer;
+use crate::field::state::State;
+use crate::field::{Capabilities, Field, Plan, SceneFeatures, Space};
+use crate::gpu::Gpu;
+use crate::photo::Reading;
+use crate::photo::color::ColorSpace;
+use crate::support::format::few;
+use crate::support::remedy::{Advised, Remedy};
+use anyhow::{Result, bail, ensure};
+use std::fmt::Display;
+
+/// A training run that can begin or go on.
+#[derive(Debug)]
+pub struct Resolved {
+    /// What its checkpoints say, at the first step of this session.
+    pub about: About,
+    /// How the kernels are linked.
+    pub plan: Plan,
+    /// Where an earlier session ended; `None` of a new run.
+    pub state: Option<State>,
+    /// Indices of the frames to train on.
+    pub train: Vec<usize>,
+    /// Indices of the frames to measure on.
+    pub test: Vec<usize>,
+}
+
+impl Resolved {
+    /// A new run on the splits of `dataset`.
+    ///
+    /// # Errors
+    /// When there is no frame to train on, a setting is unknown or out of range, or the photos are no use to it.
+    pub fn new_run(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<Self> {
+        let about = first(options, dataset, gpu)?;
+        let about = ended(about, options, gpu, None)?;
+        let plan = about.plan(Capabilities::of(gpu));
+        let (train, test) = (dataset.train.clone(), dataset.test.clone());
+        Ok(Self { about, plan, state: None, train, test })
+    }
+
+    /// The run that `checkpoint` holds, on the frames that it was trained on and with what `options` change.
+    ///
+    /// # Errors
+    /// As [`Resolved::new_run`]; and when the dataset is another one or is read in another way, or the options change
+    /// the size of the field.
+    pub fn resume(
+        options: &TrainOptions,
+        dataset: &Dataset,
+        gpu: &Gpu,
+        checkpoint: Checkpoint,
+    ) -> Result<Self> {
+        let Checkpoint { about, state } = checkpoint;
+        ensure!(!dataset.train.is_empty(), NO_FRAME);
+        same_reading(&about.reading, &dataset.reading)?;
+        let (train, test) = same_frames(&about, dataset)?;
+        let earlier = about.budget;
+        let about = again(options, about, dataset, &train)?;
+        let about = ended(about, options, gpu, Some(earlier))?;
+        let plan = about.plan(Capabilities::of(gpu));
+        Ok(Self { about, plan, state: Some(state), train, test })
+    }
+
+    /// The photos to train on.
+    #[must_use]
+    pub fn photos<'a>(&'a self, dataset: &'a Dataset) -> TrainingPhotos<'a> {
+        TrainingPhotos { dataset, frames: &self.train }
+    }
+
+    /// Whether there is room for the training and its photos, on the host and on the device; tells what they take.
+    ///
+    /// # Errors
+    /// When there is not; the message says how much there is, and what to do.
+    pub fn check_memory(&self, gpu: &Gpu, dataset: &Dataset, observer: &mut dyn Observer) -> Result<()> {
+        let memory = self.photos(dataset).memory(&self.plan);
+        observer.notice(&Event::Memory(memory));
+        memory.check(gpu, &self.plan)
+    }
+
+    /// What measures test views of `field`, on black, with the photos of a `few` of them kept; `None`
+    /// without test views.
+    ///
+    /// # Errors
+    /// When the adapter refuses a kernel, or a photo cannot be read.
+    pub fn evaluator<'a>(
+        &self,
+        field: &Field,
+        dataset: &'a Dataset,
+        few: usize,
+    ) -> Result<Option<Evaluator<'a>>> {
+        if self.test.is_empty() {
+            return Ok(None);
+        }
+        let needs = &self.about.needs;
+        let renderer = Renderer::new(field, &needs.lenses)?;
+        let mut evaluator = Evaluator::new(renderer, ColorSpace::of(needs.hdr), dataset);
+        evaluator.keep(&evenly_spaced(&self.test, few))?;
+        Ok(Some(evaluator))
+    }
+}
+
+impl Config {
+    /// The settings for a dataset when nothing is said: those of a software adapter where `is_cpu`.
+    ///
+    /// # Errors
+    /// As [`Config::preset`].
+    pub fn for_dataset(dataset: &Dataset, is_cpu: bool) -> Result<Self> {
+        Self::preset(is_cpu, dataset.bounds.cascades > 1)
+    }
+
+    /// The same with a finest level of the grid: where it is left open, it follows the pixels of the training views.
+    #[must_use]
+    pub fn with_finest(mut self, dataset: &Dataset) -> Self {
+        let cameras = dataset.cameras(&dataset.train);
+        self.grid.finest = finest_resolution(&self.grid, &Space::from(&dataset.bounds), &cameras);
+        self
+    }
+}
+
+/// The description with its names and its end.
+fn ended(about: About, options: &TrainOptions, gpu: &Gpu, earlier: Option<Budget>) -> Result<About> {
+    let budget = options.budget(gpu.is_cpu(), earlier);
+    budget.validate()?;
+    if about.config.deterministic && budget.seconds.is_some() {
+        let why = ": how many steps fit into a time differs from run to run";
+        bail!(Advised::new("a deterministic training needs ", Remedy::StepsAlone, why));
+    }
+    Ok(About { dataset: options.dataset.clone(), adapter: gpu.info.name.clone(), budget, ..about })
+}
+
+fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
+    ensure!(!dataset.train.is_empty(), NO_FRAME);
+    let bounds = dataset.bounds.clone();
+    let config = options.configure(Config::for_dataset(dataset, gpu.is_cpu())?)?.with_finest(dataset);
+    let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
+    let orbit = Orbit::of(&dataset.cameras(&dataset.train), bounds.center);
+    Ok(About {
+        format: FORMAT,
+        dataset: String::new(),
+        adapter: String::new(),
+        step: 0,
+        rays: config.batch.first_rays,
+        step_excess: 0.0,
+        seconds: 0.0,
+        budget: Budget::default(),
+        needs: SceneFeatures::of(dataset, &config)?,
+        reading: dataset.reading.clone(),
+        splits: Splits { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) },
+        image_size: [orbit.width, orbit.height],
+        has_alpha: dataset.is_cutout,
+        orbit,
+        config,
+        bounds,
+    })
+}
+
+/// The description of an earlier session with what the options change; the field's size stays.
+fn again(options: &TrainOptions, about: About, dataset: &Dataset, train: &[usize]) -> Result<About> {
+    let config = options.configure(about.config.clone())?;
+    let is_same = Layout::new(&config) == Layout::new(&about.config)
+        && config.occupancy.cells == about.config.occupancy.cells;
+    if !is_same {
+        let found = "a training cannot change its grid, network or occupancy grid ";
+        bail!(Advised::new(found, Remedy::SameField, ""));
+    }
+    let needs = about.needs.clone().for_photos(dataset, train, &config)?;
+    Ok(About { needs, config, ..about })
+}
+
+/// Photos must be read as before.
+fn same_reading(then: &Reading, now: &Reading) -> Result<()> {
+    let same = |setting: &'static str, then: &dyn Display, now: &dyn Display| -> Result<()> {
+        let (then, now) = (then.to_string(), now.to_string());
+        if then != now {
+            bail!(Advised::new("", Remedy::SameReading { setting, then, now }, ""));
+        }
+        Ok(())
+    };
+    let alpha = |reading: &Reading| format!("{:?}", reading.alpha).to_lowercase();
+    let most = |reading: &Reading| reading.max_images.map_or("all".to_owned(), |most| most.to_string());
+    same("downscale", &then.downscale, &now.downscale)?;
+    same("crop", &then.crop, &now.crop)?;
+    same("max_images", &most(then), &most(now))?;
+    same("alpha", &alpha(then), &alpha(now))?;
+    same("invert_masks", &then.invert_masks, &now.invert_masks)
+}
+
+/// The frames that an earlier session used, by name.
+fn same_frames(about: &About, dataset: &Dataset) -> Result<(Vec<usize>, Vec<usize>)> {
+    let (train, missing) = dataset.find(&about.splits.train);
+    ensure!(
+        missing.is_empty(),
+        "{} frames that were trained on are not in this dataset ({}); resume with the dataset that the \
+         training began with, {}",
+        missing.len(),
+        few(&missing),
+        about.dataset
+    );
+    let orbit = Orbit::of(&dataset.cameras(&train), about.bounds.center);
+    let is_same = [orbit.width, orbit.height] == about.image_size
+        && (orbit.radius - about.orbit.radius).abs() <= 1e-6 * orbit.radius;
+    ensure!(
+        is_same,
+        "the frames of this dataset have other cameras than those trained on; resume with the dataset that the \
+         training began with, {}",
+        about.dataset
+    );
+    ensure!(
+        about.needs.hdr == dataset.is_hdr,
+        "the training began with images of another kind (display-referred or linear); resume with {}",
+        about.dataset
+    );
+    Ok((train, dataset.find(&about.splits.test).0))
+}

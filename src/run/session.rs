@@ -1,0 +1,248 @@
+//! The session of a training run: photos and kernels, blocks of steps, and between them measurements, the log and
+//! checkpoints.
+
+mod ending;
+
+use super::clock::StepClock;
+use super::evaluate::Evaluator;
+use super::event::{Event, Observer, StepsTaken, Warning};
+use super::folder::RunFolder;
+use super::log::{self, LogRow};
+use super::log_writer::LogWriter;
+use super::options::EvaluationOptions;
+use super::resolve::Resolved;
+use super::stepper::{Block, Stepper};
+use crate::capture::dataset::Dataset;
+use crate::config::schedule::Budget;
+use crate::field::Field;
+use crate::field::checkpoint::{About, Checkpoint};
+use crate::field::train::Trainer;
+use crate::gpu::Gpu;
+use crate::support::file::writable_folder;
+use crate::support::metrics::PSNR_CAP_DB;
+use anyhow::{Context, Result, anyhow};
+pub use ending::NoTestViews;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Seconds of training between checkpoints.
+const BETWEEN_CHECKPOINTS: f64 = 60.0;
+/// Test views that are measured while training.
+const FEW_VIEWS: usize = 4;
+
+/// A training run that is about to begin or to go on.
+#[derive(Debug)]
+pub struct TrainingRun<'a> {
+    /// What it runs on.
+    pub gpu: Arc<Gpu>,
+    /// Where its photos are.
+    pub dataset: &'a Dataset,
+    /// What is trained, and for how long.
+    pub resolved: Resolved,
+    /// Where its files go.
+    pub folder: RunFolder,
+    /// When test views are measured.
+    pub evaluation: EvaluationOptions,
+}
+
+/// A training run under way.
+#[derive(Debug)]
+pub struct TrainingSession<'a> {
+    about: About,
+    test: Vec<usize>,
+    folder: RunFolder,
+    evaluation: EvaluationOptions,
+    stepper: Stepper,
+    log: LogWriter,
+    /// `None` where nothing is measured.
+    evaluator: Option<Evaluator<'a>>,
+    /// Step and seconds at the beginning of this session.
+    start: (u32, f64),
+    /// Step and seconds of the newest checkpoint; step 0 when there is none.
+    saved: (u32, f64),
+    /// The first and the last loss of this session.
+    loss: Option<[f64; 2]>,
+    is_empty: bool,
+}
+
+/// How a session ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrainingEnd {
+    /// Steps taken, those of earlier sessions included.
+    pub step: u32,
+    /// Seconds of training, those of earlier sessions included.
+    pub seconds: f64,
+    /// The first and the last loss of this session; `None` when no step was taken.
+    pub loss: Option<[f64; 2]>,
+    /// Steps of this session whose gradients could not be used.
+    pub skipped: u32,
+    /// Whether it was asked to stop before its end.
+    pub interrupted: bool,
+}
+
+impl<'a> TrainingRun<'a> {
+    /// Loads the photos, builds the kernels, and begins or goes on with the files of the folder.
+    ///
+    /// # Errors
+    /// When the memory does not suffice, a photo cannot be read, the adapter refuses a kernel, or the folder cannot be
+    /// written to.
+    pub fn begin(self, observer: &mut dyn Observer) -> Result<TrainingSession<'a>> {
+        let Self { gpu, dataset, mut resolved, folder, evaluation } = self;
+        let Resolved { about, plan, test, .. } = &resolved;
+        observer.notice(&Event::Resolved { about, plan, gpu: &gpu, test_views: test.len() });
+        resolved.check_memory(&gpu, dataset, observer)?;
+        writable_folder(folder.path())?;
+        let clock = Instant::now();
+        let views = resolved.photos(dataset).load(&gpu, &resolved.plan, observer)?;
+        let load_seconds = clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        let mut trainer = Trainer::new(Field::new(&gpu, resolved.plan.clone())?, views)?;
+        trainer.warm_up()?;
+        // It is as large as the field, and not needed any more.
+        let state = resolved.state.take();
+        state.as_ref().map_or(Ok(()), |state| trainer.restore(state))?;
+        let evaluator = match evaluation.few(FEW_VIEWS) {
+            Some(few) => resolved.evaluator(trainer.field(), dataset, few)?,
+            None => None,
+        };
+        let compile_seconds = clock.elapsed().as_secs_f64();
+        let Resolved { about, plan, test, .. } = resolved;
+        let mut log = folder.begin(&about.config, state.map(|state| state.step))?;
+        log.write(&LogRow::Start(log::Start {
+            step: about.step.into(),
+            adapter: Some(about.adapter.clone()),
+            driver: Some(format!("{} {}", gpu.info.driver, gpu.info.driver_info)),
+            left_out: plan.left_out(),
+            load_seconds: Some(load_seconds),
+            compile_seconds: Some(compile_seconds),
+        }))?;
+        let stepper = Stepper::new(trainer, StepClock::new(&about, log.logged_seconds()));
+        let start = (stepper.steps(), stepper.seconds());
+        let (saved, loss, is_empty) = (start, None, false);
+        Ok(TrainingSession {
+            about,
+            test,
+            folder,
+            evaluation,
+            stepper,
+            log,
+            evaluator,
+            start,
+            saved,
+            loss,
+            is_empty,
+        })
+    }
+}
+
+impl TrainingSession<'_> {
+    /// What its checkpoints say, at the first step of this session.
+    #[must_use]
+    pub fn about(&self) -> &About {
+        &self.about
+    }
+
+    /// Trains until the budget is spent or `stop` is raised, and saves.
+    ///
+    /// # Errors
+    /// When the training leads nowhere any more, the device was lost, or a file cannot be written. The newest
+    /// checkpoint stays; the message tells its step.
+    pub fn train(&mut self, stop: &AtomicBool, observer: &mut dyn Observer) -> Result<TrainingEnd> {
+        while !self.stepper.is_over() && !stop.load(Ordering::Relaxed) {
+            let step = self.stepper.steps();
+            let every = self.evaluation.every;
+            let pause = Budget {
+                steps: every.map(|every| (step - step % every).saturating_add(every)),
+                seconds: None,
+            };
+            let block = self.stepper.block(pause).map_err(|error| anyhow!("{error:#}; {}", self.kept()))?;
+            self.record(block, observer)?;
+            self.evaluate_if_due(observer)?;
+            if self.stepper.seconds() - self.saved.1 >= BETWEEN_CHECKPOINTS {
+                self.save(observer)?;
+            }
+        }
+        self.save(observer)?;
+        let (step, seconds) = (self.stepper.steps(), self.stepper.seconds());
+        let stages = self.stepper.stages().per_step();
+        if !stages.is_empty() {
+            let steps = self.stepper.stages().steps().into();
+            self.log.write(&LogRow::Stages(log::Stages { step: step.into(), steps, stages }))?;
+        }
+        observer.notice(&Event::Ended);
+        let (skipped, interrupted) = (self.stepper.skipped(), !self.stepper.is_over());
+        Ok(TrainingEnd { step, seconds, loss: self.loss, skipped, interrupted })
+    }
+
+    /// Logs a block and tells of it.
+    fn record(&mut self, block: Block, observer: &mut dyn Observer) -> Result<()> {
+        let (step, seconds, stats) = (self.stepper.steps(), self.stepper.seconds(), block.stats);
+        let clock = self.stepper.clock();
+        let is_relative = self.stepper.trainer().plan().has_relative_loss();
+        let psnr = (!is_relative).then(|| (-10.0 * stats.color_error.log10()).min(PSNR_CAP_DB));
+        self.loss = Some([self.loss.map_or(stats.loss, |[first, _]| first), stats.loss]);
+        if stats.samples == 0 && !self.is_empty {
+            observer.notice(&Event::Warning(Warning::Empty { step }));
+        }
+        self.is_empty = stats.samples == 0;
+        if stats.skipped > 0 && self.stepper.skipped() == stats.skipped {
+            observer.notice(&Event::Warning(Warning::Skipped { step, skipped: stats.skipped }));
+        }
+        self.log.write(&LogRow::Block(log::Steps {
+            step: step.into(),
+            seconds: Some(seconds),
+            loss: Some(stats.loss),
+            psnr,
+            rays: Some(stats.rays as f64),
+            samples: Some(stats.samples as f64),
+            marched: Some(stats.marched as f64),
+            skipped: stats.skipped.into(),
+            learning_rate: Some(clock.learning_rate(step, 0.0)),
+        }))?;
+        let (spent, remaining) = (clock.spent(step), clock.remaining(step, self.start));
+        observer.notice(&Event::Steps(StepsTaken { step, seconds, block, psnr, spent, remaining }));
+        Ok(())
+    }
+
+    fn evaluate_if_due(&mut self, observer: &mut dyn Observer) -> Result<()> {
+        let step = self.stepper.steps();
+        let Some(evaluator) = &mut self.evaluator else { return Ok(()) };
+        if self.evaluation.every.is_none_or(|every| !step.is_multiple_of(every)) {
+            return Ok(());
+        }
+        let clock = Instant::now();
+        let Some(means) = evaluator.kept()? else { return Ok(()) };
+        observer.notice(&Event::Evaluated { step, means });
+        self.log.write(&LogRow::Evaluation(log::Evaluation {
+            step: step.into(),
+            seconds: Some(self.stepper.seconds()),
+            eval_psnr: Some(means.psnr),
+            eval_seconds: Some(clock.elapsed().as_secs_f64()),
+            views: means.views as u64,
+            near_share: means.near_share,
+            ..log::Evaluation::default()
+        }))
+    }
+
+    fn save(&mut self, observer: &mut dyn Observer) -> Result<()> {
+        let state = self.stepper.trainer().state()?;
+        let (step, rays, step_excess) = (state.step, state.rays, state.step_excess);
+        let seconds = self.stepper.clock().recorded_seconds();
+        let about = About { step, rays, step_excess, seconds, ..self.about.clone() };
+        let path = self.folder.checkpoint();
+        let saved = Checkpoint { about, state }.save(&path);
+        saved.with_context(|| format!("at step {step} ({})", self.kept()))?;
+        self.saved = (step, self.stepper.seconds());
+        observer.notice(&Event::Saved { step, path: &path });
+        Ok(())
+    }
+
+    /// What there is to go on with.
+    fn kept(&self) -> String {
+        match self.saved.0 {
+            0 => "nothing was saved yet".to_owned(),
+            step => format!("the checkpoint of step {step} is kept"),
+        }
+    }
+}

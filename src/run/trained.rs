@@ -1,0 +1,51 @@
+//! A trained field, from its checkpoint onto a device.
+
+use crate::camera::LensKind;
+use crate::field::Field;
+use crate::field::checkpoint::{self, About, Checkpoint};
+use crate::field::render::Renderer;
+use crate::gpu::Gpu;
+use crate::photo::color::ColorSpace;
+use anyhow::Result;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A checkpoint that was read.
+#[derive(Debug)]
+pub struct TrainedField {
+    /// The file.
+    pub path: PathBuf,
+    checkpoint: Checkpoint,
+}
+
+impl TrainedField {
+    /// Reads the checkpoint that `run`, a folder or the file itself, stands for.
+    ///
+    /// # Errors
+    /// When there is none, or it cannot be used.
+    pub fn load(run: &Path) -> Result<Self> {
+        let path = checkpoint::locate(run)?;
+        Ok(Self { checkpoint: Checkpoint::load(&path)?, path })
+    }
+
+    /// What the checkpoint says about itself.
+    #[must_use]
+    pub fn about(&self) -> &About {
+        &self.checkpoint.about
+    }
+
+    /// The colour space of what it renders.
+    #[must_use]
+    pub fn color_space(&self) -> ColorSpace {
+        ColorSpace::of(self.about().needs.hdr)
+    }
+
+    /// A renderer of the field for cameras with `lenses`.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold the field, or refuses a kernel.
+    pub fn renderer(&self, gpu: &Arc<Gpu>, lenses: &BTreeSet<LensKind>) -> Result<Renderer> {
+        Renderer::new(&Field::of(gpu, &self.checkpoint)?, lenses)
+    }
+}
