@@ -35,6 +35,14 @@ pub const WANTED_FEATURES: wgpu::Features = wgpu::Features::SHADER_FLOAT32_ATOMI
     .union(wgpu::Features::TIMESTAMP_QUERY);
 
 impl Gpu {
+    /// Opens the adapter that `choice` names, as [`adapter::choose`] understands it; the first one where it names none.
+    ///
+    /// # Errors
+    /// When there is no adapter, or none that fits, or the driver refuses to create the device.
+    pub fn choose(choice: Option<&str>) -> Result<Self> {
+        Self::open(&adapter::choose(choice)?)
+    }
+
     /// Opens `adapter` with its own limits and every wanted feature it has.
     ///
     /// # Errors
@@ -62,6 +70,13 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .with_context(|| format!("opening the adapter '{}'", info.name))?;
+        Ok(Self::from_device(device, queue, info))
+    }
+
+    /// A device that is open already, for example that of a viewer: of the wanted features it uses those that it has. Its
+    /// errors are told by [`Gpu::check`] from now on.
+    #[must_use]
+    pub fn from_device(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
         let error = Arc::new(Mutex::new(None));
         let sink = Arc::clone(&error);
         device.on_uncaptured_error(Arc::new(move |failure: wgpu::Error| {
@@ -69,7 +84,7 @@ impl Gpu {
                 first.get_or_insert_with(|| failure.to_string());
             }
         }));
-        Ok(Self { device, queue, info, error })
+        Self { device, queue, info, error }
     }
 
     /// Whether the adapter runs on the CPU (lavapipe, WARP), where the fast layout is another one.

@@ -7,15 +7,15 @@
 //! transforms.json + images ──> dataset ──> train ──> checkpoint ──> render ──> EXR, PNG, scores
 //! ```
 //!
-//! [`capture`] reads cameras and photos from files and says what is wrong with them; [`field`] is the radiance field
-//! on a device: [`field::train::Trainer`] takes steps (rays, march, density, selection, colour, the fused
-//! render·loss·gradient kernel, backward, Adam), [`field::render::Renderer`] shows it to any camera,
-//! [`field::checkpoint`] keeps it on disk. [`run`] is a training run as a whole, and the command line on top of it is the
-//! binary of this package.
+//! A [`Dataset`] has cameras and photos from files. A [`Field`] is a radiance field on a device ([`Gpu`]): a [`Trainer`]
+//! takes steps (rays, march, density, selection, colour, the fused render·loss·gradient kernel, backward, Adam), a
+//! [`Renderer`] shows it to any camera, and a [`Checkpoint`] keeps it on disk. A [`TrainingRun`] is a training as a whole,
+//! with its budget, log, checkpoints and evaluation, told to an [`Observer`]; the command line is a thin layer on it.
 //!
-//! Underneath, [`camera`], [`photo`] and [`config`] are plain values, and [`gpu`] knows adapters, linking and binding by
-//! name. [`verify`] has the same mathematics in plain `f64`, which the kernels are tested against, and scenes whose
-//! truth is known.
+//! Without the default feature `cli` there is no terminal; without `run` there are no files but checkpoints: no datasets,
+//! no decoders, no charts, no command line.
+//!
+//! What stands in which room of the sources, and what must stay true of them, is in `docs/architecture.md`.
 //!
 //! # Conventions
 //!
@@ -24,18 +24,19 @@
 //! - A field of images in 8 or 16 bits holds display-referred (sRGB) colours, and is composited as such; a field
 //!   of OpenEXR or Radiance HDR images holds linear light. Rendered colours are premultiplied by their opacity.
 //! - Depth is the mean distance along the view axis, or along the ray where a lens sees sideways and behind
-//!   ([`camera::LensKind::depth_is_distance`]), in world units.
+//!   ([`LensKind::depth_is_distance`]), in world units.
 //! - Gradients are called `d_<name>` for the derivative of the loss by `<name>`.
 //!
 //! # A training in code
 //!
 //! ```no_run
-//! use nerf::{capture::dataset::Dataset, config::Config, field::train::Trainer, gpu};
+//! # #[cfg(feature = "run")]
+//! # fn main() -> anyhow::Result<()> {
+//! use nerf::{Config, Dataset, Gpu, Trainer};
 //! use std::{path::Path, sync::Arc};
 //!
-//! # fn main() -> anyhow::Result<()> {
 //! let dataset = Dataset::open(Path::new("data/lego"), &Default::default())?;
-//! let gpu = Arc::new(gpu::Gpu::open(&gpu::adapter::choose(None)?)?);
+//! let gpu = Arc::new(Gpu::choose(None)?);
 //! let mut trainer = Trainer::on(&gpu, &dataset, Config::for_dataset(&dataset, gpu.is_cpu())?)?;
 //! for _ in 0..1000 {
 //!     trainer.step(1e-2, None)?;
@@ -43,14 +44,43 @@
 //! println!("loss {}", trainer.report()?.loss);
 //! # Ok(())
 //! # }
+//! # #[cfg(not(feature = "run"))]
+//! # fn main() {}
 //! ```
 
+// The rooms are for the program, the tests and the benches of this package; what is in them may change with every version.
+#[doc(hidden)]
 pub mod camera;
+#[cfg(feature = "run")]
+#[doc(hidden)]
 pub mod capture;
+#[doc(hidden)]
 pub mod config;
+#[doc(hidden)]
 pub mod field;
+#[doc(hidden)]
 pub mod gpu;
+#[doc(hidden)]
 pub mod photo;
+#[cfg(feature = "run")]
+#[doc(hidden)]
 pub mod run;
+#[doc(hidden)]
 pub mod support;
+#[cfg(feature = "run")]
+#[doc(hidden)]
 pub mod verify;
+
+pub use camera::{Bounds, Camera, Lens, LensKind};
+pub use config::Config;
+pub use field::Field;
+pub use field::checkpoint::Checkpoint;
+pub use field::render::{Renderer, View};
+pub use field::train::{StepStats, Trainer};
+pub use gpu::Gpu;
+pub use photo::{Image, Photo};
+
+#[cfg(feature = "run")]
+pub use capture::dataset::{Dataset, OpenOptions};
+#[cfg(feature = "run")]
+pub use run::{Evaluator, Event, Observer, Resolved, RunFolder, TrainOptions, TrainingRun, TrainingSession};

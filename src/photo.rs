@@ -1,19 +1,12 @@
 //! Photos as plain values: pixels, masks, depth, and how they are to be read. No files.
 
-mod alpha;
 pub mod color;
-mod grid;
 mod image;
 mod reading;
-mod reduce;
 mod split;
 
-pub(crate) use alpha::{Evidence, Multiplied};
-pub use grid::{Turn, Window};
-pub(crate) use grid::{crop, nearest};
 pub use image::{BitDepth, Image, Pixels};
 pub use reading::{AlphaMode, Crop, Reading};
-pub(crate) use reduce::{reduce_any, reduce_depth};
 pub use split::Split;
 
 use crate::support::format::count;

@@ -35,7 +35,8 @@ impl Bounds {
     }
 
     /// Whether a ray meets the cube of this half side about the centre.
-    pub(crate) fn meets(&self, half: f64, ray: &Ray) -> bool {
+    #[must_use]
+    pub fn meets(&self, half: f64, ray: &Ray) -> bool {
         let inverse = ray.direction.recip();
         let middle = self.center - ray.origin;
         let (a, b) = ((middle - half) * inverse, (middle + half) * inverse);

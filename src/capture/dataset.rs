@@ -11,6 +11,7 @@ mod located;
 mod look_ahead;
 pub(crate) mod notes;
 mod open;
+mod part;
 mod photo;
 mod pose;
 mod samples;

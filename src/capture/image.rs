@@ -1,9 +1,12 @@
 //! Image files: every format that is read, PNG and OpenEXR as they are written.
 
+mod alpha;
 mod decode;
 mod depth;
+mod grid;
 mod jpeg;
 mod open_exr;
+mod reduce;
 
 use std::path::Path;
 
@@ -12,11 +15,15 @@ use ::image::metadata::Orientation;
 use ::image::{ExtendedColorType, ImageEncoder};
 use anyhow::{Context, Result, ensure};
 
-use crate::photo::{BitDepth, Image, Turn};
+use crate::photo::{BitDepth, Image, Pixels};
 use crate::support::file::write_atomically;
+pub(crate) use alpha::{Evidence, Multiplied};
 use decode::Kind;
 pub use depth::{DepthMap, load_depth};
+pub use grid::{Turn, Window};
+pub(crate) use grid::{crop, nearest};
 pub use open_exr::{ExrPixels, Precision, read_exr_channel, write_exr};
+pub(crate) use reduce::{reduce_any, reduce_depth};
 
 /// The formats that [`Image::load`] reads, for messages.
 pub const FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP, OpenEXR or Radiance HDR";
@@ -56,6 +63,13 @@ impl Image {
             Kind::Common(format) => decode::load(path, format),
         };
         of_file(path, load)
+    }
+
+    /// 8-bit pixels in 16 bits; others as they are.
+    pub(crate) fn in_16_bits(self) -> Self {
+        let Pixels::Srgb8(pixels) = self.pixels else { return self };
+        let pixels = pixels.iter().map(|pixel| pixel.map(|value| u16::from(value) * 257)).collect();
+        Self { pixels: Pixels::Srgb16(pixels), ..self }
     }
 }
 
@@ -124,7 +138,6 @@ fn check_count(width: u32, height: u32, count: usize) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photo::Pixels;
     use ::image::{DynamicImage, ImageBuffer, Luma, Rgb};
 
     #[test]

@@ -21,6 +21,7 @@ use serde_json::Value;
 use std::collections::HashMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The layout of the file that this version writes and reads.
 pub const FORMAT: u64 = 2;
@@ -60,7 +61,7 @@ pub struct About {
     /// When the training is to end.
     pub budget: Budget,
     /// The resolved configuration; `grid.finest` is never 0.
-    pub config: Config,
+    pub config: Arc<Config>,
     /// The scene's box in world space.
     pub bounds: Bounds,
     /// What the kernels were linked with.
@@ -109,7 +110,7 @@ impl About {
     /// How kernels are linked for an adapter.
     #[must_use]
     pub fn plan(&self, adapter: Capabilities) -> Plan {
-        Plan::suited_to(adapter, self.config.clone(), self.needs.clone(), Space::from(&self.bounds))
+        Plan::suited_to(adapter, Arc::clone(&self.config), self.needs.clone(), Space::from(&self.bounds))
     }
 
     /// The arrays of the state, which are the same on every adapter.
@@ -275,7 +276,7 @@ mod tests {
             step_excess: 0.25,
             seconds: 6.75,
             budget: Budget { steps: Some(100), seconds: None },
-            config,
+            config: config.into(),
             bounds,
             needs,
             reading: Reading { downscale: 2, ..Reading::default() },

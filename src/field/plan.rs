@@ -8,6 +8,7 @@ use crate::config::{Accumulation, ColorLoss, Config};
 use crate::gpu::Gpu;
 use crate::gpu::tensor::Memory;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// llvmpipe ends the loops of a thread after so many rounds together, without an error; ordered sums have one round
 /// per kept sample.
@@ -16,8 +17,8 @@ const LONGEST_LOOP: usize = 65_535;
 /// Everything that decides how kernels are linked.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The resolved configuration.
-    pub config: Config,
+    /// The resolved configuration, which a run and its checkpoints share.
+    pub config: Arc<Config>,
     /// The parameters' layout.
     pub layout: Layout,
     /// What the scene needs.
@@ -41,13 +42,19 @@ pub struct Plan {
 impl Plan {
     /// Chooses what depends on the adapter; `grid.finest` is never 0.
     #[must_use]
-    pub fn new(gpu: &Gpu, config: Config, needs: SceneFeatures, space: Space) -> Self {
+    pub fn new(gpu: &Gpu, config: impl Into<Arc<Config>>, needs: SceneFeatures, space: Space) -> Self {
         Self::suited_to(Capabilities::of(gpu), config, needs, space)
     }
 
     /// As [`Plan::new`], for an adapter that need not be there.
     #[must_use]
-    pub fn suited_to(adapter: Capabilities, config: Config, needs: SceneFeatures, space: Space) -> Self {
+    pub fn suited_to(
+        adapter: Capabilities,
+        config: impl Into<Arc<Config>>,
+        needs: SceneFeatures,
+        space: Space,
+    ) -> Self {
+        let config = config.into();
         let layout = Layout::new(&config);
         let capacity = Capacity::of_steps(&config.batch);
         let orders = adapter.is_cpu && capacity.kept <= LONGEST_LOOP;

@@ -63,13 +63,6 @@ impl Image {
         let logs: Vec<f64> = lit.map(|(value, alpha)| f64::from(value / alpha).ln()).collect();
         (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
     }
-
-    /// 8-bit pixels in 16 bits; others as they are.
-    pub(crate) fn in_16_bits(self) -> Self {
-        let Pixels::Srgb8(pixels) = self.pixels else { return self };
-        let pixels = pixels.iter().map(|pixel| pixel.map(|value| u16::from(value) * 257)).collect();
-        Self { pixels: Pixels::Srgb16(pixels), ..self }
-    }
 }
 
 impl Pixels {

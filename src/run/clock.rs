@@ -1,17 +1,17 @@
 //! The clock of a training run: the only owner of its seconds, and what follows from them.
 
-use crate::config::Optimizer;
+use crate::config::Config;
 use crate::config::schedule::Budget;
 use crate::field::checkpoint::About;
+use std::sync::Arc;
 
 /// Seconds of training, which pass while steps are taken and stand still otherwise, and the budget they are spent of.
 #[derive(Clone, Debug)]
 pub struct StepClock {
     budget: Budget,
-    optimizer: Optimizer,
+    config: Arc<Config>,
     seconds: f64,
     seconds_per_step: f64,
-    is_deterministic: bool,
 }
 
 impl StepClock {
@@ -21,10 +21,9 @@ impl StepClock {
     pub fn new(about: &About, logged: f64) -> Self {
         Self {
             budget: about.budget,
-            optimizer: about.config.optimizer.clone(),
+            config: Arc::clone(&about.config),
             seconds: about.seconds.max(logged),
             seconds_per_step: 0.0,
-            is_deterministic: about.config.deterministic,
         }
     }
 
@@ -38,7 +37,7 @@ impl StepClock {
     /// has them.
     #[must_use]
     pub fn recorded_seconds(&self) -> f64 {
-        if self.is_deterministic { 0.0 } else { self.seconds }
+        if self.config.deterministic { 0.0 } else { self.seconds }
     }
 
     /// The part of the budget that is spent after `step` steps, within `[0, 1]`.
@@ -63,13 +62,13 @@ impl StepClock {
     /// The learning rate of the step after `step` steps, where `elapsed` more seconds have passed.
     #[must_use]
     pub fn learning_rate(&self, step: u32, elapsed: f64) -> f64 {
-        self.budget.learning_rate(&self.optimizer, step, self.seconds + elapsed)
+        self.budget.learning_rate(&self.config.optimizer, step, self.seconds + elapsed)
     }
 
     /// The learning rate that the run began with.
     #[must_use]
     pub fn first_learning_rate(&self) -> f64 {
-        self.optimizer.learning_rate
+        self.config.optimizer.learning_rate
     }
 
     /// The steps to take before looking at the clock again: at least one and at most `most`, neither beyond the budget
@@ -94,10 +93,9 @@ mod tests {
     fn clock(is_deterministic: bool) -> StepClock {
         StepClock {
             budget: Budget { steps: Some(100), seconds: Some(10.0) },
-            optimizer: Optimizer::default(),
+            config: Config { deterministic: is_deterministic, ..Config::default() }.into(),
             seconds: 2.0,
             seconds_per_step: 0.0,
-            is_deterministic,
         }
     }
 

@@ -160,14 +160,14 @@ fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<About> 
         image_size: [orbit.width, orbit.height],
         has_alpha: dataset.is_cutout,
         orbit,
-        config,
+        config: config.into(),
         bounds,
     })
 }
 
 /// The description of an earlier session with what the options change; the field's size stays.
 fn again(options: &TrainOptions, about: About, dataset: &Dataset, train: &[usize]) -> Result<About> {
-    let config = options.configure(about.config.clone())?;
+    let config = options.configure(Config::clone(&about.config))?;
     let is_same = Layout::new(&config) == Layout::new(&about.config)
         && config.occupancy.cells == about.config.occupancy.cells;
     if !is_same {
@@ -175,7 +175,7 @@ fn again(options: &TrainOptions, about: About, dataset: &Dataset, train: &[usize
         bail!(Advised::new(found, Remedy::SameField, ""));
     }
     let needs = about.needs.clone().for_photos(dataset, train, &config)?;
-    Ok(About { needs, config, ..about })
+    Ok(About { needs, config: config.into(), ..about })
 }
 
 /// Photos must be read as before.

@@ -3,8 +3,8 @@
 use super::medium::Samples;
 use anyhow::{Context, Result, ensure};
 use glam::DVec3;
-use nerf::config;
-use nerf::field::{color, composite};
+use nerf::config::{self, Config};
+use nerf::field::{Plan, color, composite};
 use nerf::gpu::Gpu;
 use nerf::gpu::pass::Stage;
 use nerf::gpu::timer::Timer;
@@ -169,12 +169,13 @@ impl Device {
 
 /// Selection, as a training has it, and compositing, with the variant's constants.
 fn stages(bench: &Workbench, variant: Variant) -> Result<Vec<Stage>> {
-    let mut plan = bench.plan.clone();
-    plan.config.selection.stop_transmittance = variant.stop();
-    plan.config.transmittance = match variant.transmittance {
+    let mut config = Config::clone(&bench.plan.config);
+    config.selection.stop_transmittance = variant.stop();
+    config.transmittance = match variant.transmittance {
         Transmittance::Exclusive => config::Transmittance::Exclusive,
         Transmittance::Inclusive => config::Transmittance::Inclusive,
     };
+    let plan = Plan { config: config.into(), ..bench.plan.clone() };
     let mut stages = color::stages(&bench.gpu, &plan, &bench.workspace, color::Selection::Training)?;
     stages.retain(|stage| SELECTING.contains(&stage.bound.label.as_str()));
     ensure!(stages.len() == SELECTING.len(), "selection has {} of the stages {SELECTING:?}", stages.len());

@@ -12,9 +12,10 @@ use super::notes::{Notes, Severity};
 use super::photo::Source;
 use super::sidecars::{Finder, Sidecars};
 use super::{Frame, OpenOptions, Split, frames};
+use crate::capture::image::Turn;
 use crate::capture::image::{FORMATS, Header};
+use crate::photo::BitDepth;
 use crate::photo::Reading;
-use crate::photo::{BitDepth, Turn};
 use crate::support::format::few;
 use crate::support::remedy::{Advised, Remedy};
 

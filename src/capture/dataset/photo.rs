@@ -5,8 +5,9 @@ use anyhow::{Context, Result, ensure};
 use super::sidecars::{Depth, Ignores, Mask, Sidecars};
 use super::{Dataset, Frame, look_ahead};
 use crate::capture::image::load_depth;
+use crate::capture::image::{Multiplied, Turn, Window, crop, nearest, reduce_any, reduce_depth};
 use crate::photo::{AlphaMode, Photo, Reading};
-use crate::photo::{BitDepth, Image, Multiplied, Turn, Window, crop, nearest, reduce_any, reduce_depth};
+use crate::photo::{BitDepth, Image};
 
 /// Where a frame's pixels come from.
 #[derive(Clone, Debug)]

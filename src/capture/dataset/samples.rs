@@ -7,9 +7,10 @@ use super::Frame;
 use super::notes::{Notes, Severity};
 use super::photo::How;
 use super::splits::evenly_spaced;
+use crate::capture::image::{Evidence, Multiplied};
 use crate::capture::scene_box::Surroundings;
+use crate::photo::BitDepth;
 use crate::photo::{AlphaMode, Reading};
-use crate::photo::{BitDepth, Evidence, Multiplied};
 use crate::support::remedy::{Advised, Remedy};
 
 /// Images that are looked at to tell what their alpha means.

@@ -49,7 +49,7 @@ struct Run {
     #[serde(flatten)]
     curve: Curve,
     /// All settings.
-    settings: nerf::config::Config,
+    settings: Arc<nerf::config::Config>,
 }
 
 /// What is the same in all runs.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::image::{Image, Pixels};
+use crate::photo::{Image, Pixels};
 
 /// The source pixels along one axis that a smaller pixel covers: the first one, and the share of each.
 struct Span {

@@ -1,6 +1,6 @@
 //! Straight and premultiplied alpha.
 
-use super::image::{Image, Pixels};
+use crate::photo::{Image, Pixels};
 
 /// What the colours of a file with alpha were multiplied with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

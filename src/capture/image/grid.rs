@@ -1,6 +1,6 @@
 //! Rearranging the values of pixels: turning, cutting, and picking the nearest.
 
-use super::image::{Image, Pixels};
+use crate::photo::{Image, Pixels};
 
 /// A turn of a picture that swaps its width and its height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
