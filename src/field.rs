@@ -22,7 +22,7 @@ mod space;
 pub mod stages;
 pub mod state;
 pub mod train;
-mod variants;
+pub mod variants;
 pub mod views;
 pub mod visibility;
 mod workspace;

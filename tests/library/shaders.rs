@@ -8,7 +8,7 @@ use nerf::camera::{Bounds, LensKind};
 use nerf::config::{Accumulation, Config};
 use nerf::field::layer::Product;
 use nerf::field::link::{self, Link};
-use nerf::field::{Capabilities, LAYOUTS, Plan, SceneFeatures, Space, records};
+use nerf::field::{Capabilities, LAYOUTS, Plan, SceneFeatures, Space, records, variants};
 use nerf::gpu::banks::Capacity;
 use nerf::gpu::kernel::Layout as StructLayout;
 use nerf::gpu::source::{Linked, Source};
@@ -278,6 +278,25 @@ fn every_set_of_lenses_links() {
         }
     }
     assert_eq!(linker.combinations, 2 * 31);
+}
+
+/// The table in `shaders/README.md` is what the linker goes by.
+#[test]
+fn the_table_of_slots_is_true() {
+    let variants: BTreeMap<_, _> = link::slots().into_iter().collect();
+    let chosen_by: Vec<_> = variants::chosen_by().collect();
+    let named: BTreeSet<_> = chosen_by.iter().map(|(slot, _)| *slot).collect();
+    assert_eq!(named, variants.keys().copied().collect(), "every folder is a slot, and every slot a folder");
+    let row = |(slot, by): &(&str, &str)| {
+        let mut files = variants[slot].clone();
+        files.sort_unstable();
+        let files: Vec<_> = files.iter().map(|file| format!("`{file}`")).collect();
+        format!("| `{slot}` | {} | {by} |\n", files.join(", "))
+    };
+    let rows: String = chosen_by.iter().map(row).collect();
+    let table = format!("| slot | variants | chosen by |\n| --- | --- | --- |\n{rows}");
+    let readme = std::fs::read_to_string("shaders/README.md").expect("a readme");
+    assert!(readme.contains(&table), "shaders/README.md should have:\n{table}");
 }
 
 /// A line of needs that names what the file does not use, or that is not there at all, misleads.
