@@ -13,7 +13,7 @@ mod open_cv;
 pub mod orbit;
 
 pub use bounds::Bounds;
-pub use lens::{Lens, LensKind};
+pub use lens::{Geometry, Lens, LensKind};
 
 use glam::{DAffine3, DVec2, DVec3};
 use lens::LensRay;
@@ -86,7 +86,7 @@ impl Camera {
     /// How many pixels a world unit across the view covers at `distance` from the camera, near the view axis.
     pub fn pixels_per_length(&self, distance: f64) -> f64 {
         let focal_px = self.focal_px.max_element();
-        if self.lens == Lens::Orthographic { focal_px } else { focal_px / distance }
+        if self.lens.geometry() == Geometry::Parallel { focal_px } else { focal_px / distance }
     }
 
     /// Where a ball is imaged: a point of pixel space, and a distance from it in pixels that holds the whole image.
@@ -95,10 +95,10 @@ impl Camera {
     pub fn footprint(&self, center: DVec3, radius: f64) -> Option<(DVec2, f64)> {
         let seen = self.world_from_camera.inverse().transform_point3(center);
         let (plane, depth) = self.lens.image(seen)?;
-        let reach = match &self.lens {
-            Lens::Pinhole | Lens::OpenCv { .. } => radius / depth,
-            Lens::Orthographic => radius,
-            Lens::Fisheye { .. } | Lens::Equirectangular => {
+        let reach = match self.lens.geometry() {
+            Geometry::Plane => radius / depth,
+            Geometry::Parallel => radius,
+            Geometry::Angles => {
                 let spread = (radius / depth).asin();
                 self.lens.stretch(plane, seen, spread)? * spread
             }

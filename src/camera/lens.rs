@@ -52,6 +52,18 @@ pub enum LensKind {
     Equirectangular,
 }
 
+/// What the image of a lens is laid out by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Geometry {
+    /// A plane at distance 1, up to distortion: what is twice as far away is half as large, and nothing beside or behind
+    /// the camera is seen.
+    Plane,
+    /// Angles: the lens sees sideways and behind.
+    Angles,
+    /// Parallel rays: sizes do not depend on distances.
+    Parallel,
+}
+
 /// A ray in the camera's axes; lengths are in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LensRay {
@@ -84,11 +96,33 @@ impl LensKind {
         }
     }
 
+    /// What it does, in a line.
+    #[must_use]
+    pub const fn description(self) -> &'static str {
+        match self {
+            Self::Pinhole => "No distortion",
+            Self::OpenCv => "Radial and tangential distortion",
+            Self::Fisheye => "OpenCV's fisheye, 180 degrees across the diagonal",
+            Self::Orthographic => "Parallel rays",
+            Self::Equirectangular => "The whole sphere, for images twice as wide as high",
+        }
+    }
+
+    /// What its image is laid out by.
+    #[must_use]
+    pub const fn geometry(self) -> Geometry {
+        match self {
+            Self::Pinhole | Self::OpenCv => Geometry::Plane,
+            Self::Fisheye | Self::Equirectangular => Geometry::Angles,
+            Self::Orthographic => Geometry::Parallel,
+        }
+    }
+
     /// What depth means behind such a lens, wherever a depth is given: the distance along the ray for a lens that
     /// sees sideways and behind (fisheye, equirectangular), the distance along the view axis otherwise.
     #[must_use]
     pub const fn depth_is_distance(self) -> bool {
-        matches!(self, Self::Fisheye | Self::Equirectangular)
+        matches!(self.geometry(), Geometry::Angles)
     }
 }
 
@@ -109,6 +143,22 @@ impl Lens {
     #[must_use]
     pub const fn depth_is_distance(&self) -> bool {
         self.kind().depth_is_distance()
+    }
+
+    /// What its image is laid out by.
+    #[must_use]
+    pub const fn geometry(&self) -> Geometry {
+        self.kind().geometry()
+    }
+
+    /// Radial and tangential coefficients; 0 for what a lens does not have.
+    #[must_use]
+    pub const fn coefficients(&self) -> ([f64; 4], [f64; 2]) {
+        match *self {
+            Self::OpenCv { k, p } => (k, p),
+            Self::Fisheye { k } => (k, [0.0; 2]),
+            Self::Pinhole | Self::Orthographic | Self::Equirectangular => ([0.0; 4], [0.0; 2]),
+        }
     }
 
     /// Where the polynomial of a lens stops growing, beyond which nothing is imaged: for a fisheye the angle to the

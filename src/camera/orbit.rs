@@ -1,6 +1,6 @@
 //! Views all around a scene, from what the training cameras had in common.
 
-use crate::camera::{Camera, Lens, LensKind};
+use crate::camera::{Camera, Geometry, Lens};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -84,10 +84,10 @@ impl Orbit {
 /// sees more than it is pointed at.
 fn tangent(camera: &Camera, center: DVec3) -> f64 {
     let width = f64::from(camera.width) / camera.focal_px.x;
-    match camera.lens.kind() {
-        LensKind::Pinhole | LensKind::OpenCv => width,
-        LensKind::Orthographic => width / camera.position().distance(center).max(1e-9),
-        LensKind::Fisheye | LensKind::Equirectangular => 2.0 * (0.5 * width).min(WIDEST_RAD).tan(),
+    match camera.lens.geometry() {
+        Geometry::Plane => width,
+        Geometry::Parallel => width / camera.position().distance(center).max(1e-9),
+        Geometry::Angles => 2.0 * (0.5 * width).min(WIDEST_RAD).tan(),
     }
 }
 

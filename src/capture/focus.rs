@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::camera::{Camera, Lens, LensKind};
+use crate::camera::{Camera, Geometry};
 
 /// What matters about a camera here, in world space.
 #[derive(Clone, Copy, Debug)]
@@ -24,15 +24,15 @@ impl Axis {
         let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
         let middle = camera.ray(0.5 * size);
         let half = (0.5 * size / camera.focal_px).max_element();
-        let is_parallel = camera.lens == Lens::Orthographic;
+        let geometry = camera.lens.geometry();
         Self {
             origin: camera.position(),
             direction: middle.map_or(camera.forward(), |ray| ray.direction),
-            half_width: if is_parallel { half } else { 0.0 },
-            tan_half: match camera.lens.kind() {
-                LensKind::Pinhole | LensKind::OpenCv => half,
-                LensKind::Orthographic => 0.0,
-                LensKind::Fisheye | LensKind::Equirectangular => half.min(WIDEST_TANGENT.atan()).tan(),
+            half_width: if geometry == Geometry::Parallel { half } else { 0.0 },
+            tan_half: match geometry {
+                Geometry::Plane => half,
+                Geometry::Parallel => 0.0,
+                Geometry::Angles => half.min(WIDEST_TANGENT.atan()).tan(),
             },
         }
     }

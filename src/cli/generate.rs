@@ -41,13 +41,6 @@ pub(crate) struct Generate {
 
 /// Kinds of lenses that cameras have in turn.
 fn lenses() -> OneOf<Vec<LensKind>> {
-    let help = |kind| match kind {
-        LensKind::Pinhole => "No distortion",
-        LensKind::OpenCv => "Radial and tangential distortion",
-        LensKind::Fisheye => "OpenCV's fisheye, 180 degrees across the diagonal",
-        LensKind::Orthographic => "Parallel rays",
-        LensKind::Equirectangular => "The whole sphere, for images twice as wide as high",
-    };
-    let one = LensKind::ALL.map(|kind| (kind.name().to_lowercase(), help(kind), vec![kind]));
+    let one = LensKind::ALL.map(|kind| (kind.name().to_lowercase(), kind.description(), vec![kind]));
     OneOf::new(one.into_iter().chain([("mixed".to_owned(), "All of them in turn", LensKind::ALL.to_vec())]))
 }

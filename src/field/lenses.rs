@@ -4,14 +4,8 @@ use crate::camera::LensKind;
 use std::collections::BTreeSet;
 
 /// The file of a lens, and the prefix of its functions.
-pub(super) fn file(kind: LensKind) -> &'static str {
-    match kind {
-        LensKind::Pinhole => "pinhole",
-        LensKind::OpenCv => "opencv",
-        LensKind::Fisheye => "fisheye",
-        LensKind::Orthographic => "orthographic",
-        LensKind::Equirectangular => "equirectangular",
-    }
+pub(super) fn file(kind: LensKind) -> String {
+    kind.name().to_lowercase()
 }
 
 /// Names of the lenses that no camera has.

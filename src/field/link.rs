@@ -152,7 +152,7 @@ impl Linker<'_> {
         if name == LENS {
             let lenses = &self.plan.needs.lenses;
             for &kind in lenses {
-                self.add_file(LENS, lenses::file(kind))?;
+                self.add_file(LENS, &lenses::file(kind))?;
             }
             return self.add(LENS, &lenses::choice(lenses));
         }

@@ -2,7 +2,7 @@
 
 use super::Space;
 use super::lenses;
-use crate::camera::Lens;
+use crate::camera::Geometry;
 use crate::config::Optimizer;
 use crate::field::layout::Level;
 use crate::gpu::kernel::{Layout, Shared};
@@ -185,15 +185,11 @@ impl Camera {
         let pose = camera.world_from_camera;
         let side = space.world_per_box();
         let axis = |axis: glam::DVec3| axis.normalize_or_zero().as_vec3().to_array();
-        let (radial, tangential) = match camera.lens {
-            Lens::OpenCv { k, p } => (k, p),
-            Lens::Fisheye { k } => (k, [0.0; 2]),
-            Lens::Pinhole | Lens::Orthographic | Lens::Equirectangular => ([0.0; 4], [0.0; 2]),
-        };
+        let (radial, tangential) = camera.lens.coefficients();
         // A parallel projection has pixels per length, and lengths are those of the box.
-        let focal_px = match camera.lens {
-            Lens::Orthographic => camera.focal_px * side,
-            _ => camera.focal_px,
+        let focal_px = match camera.lens.geometry() {
+            Geometry::Parallel => camera.focal_px * side,
+            Geometry::Plane | Geometry::Angles => camera.focal_px,
         };
         Self {
             origin: space.in_box(pose.translation).as_vec3().to_array(),

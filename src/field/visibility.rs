@@ -5,7 +5,7 @@
 
 use super::Space;
 use super::silhouette::Silhouette;
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, Geometry};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -111,11 +111,10 @@ impl<'a> View<'a> {
 /// The corners and the middles of the sides are farthest from the axis.
 fn half_angle(camera: &Camera) -> f64 {
     // Beyond its rim a lens sees nothing, so that it is the cone where the image reaches farther.
-    let rim = match camera.lens {
-        Lens::Orthographic | Lens::Equirectangular => return PI,
-        Lens::Pinhole => FRAC_PI_2,
-        Lens::OpenCv { .. } => camera.lens.rim().map_or(FRAC_PI_2, f64::atan),
-        Lens::Fisheye { .. } => camera.lens.rim().unwrap_or(PI),
+    let rim = match (camera.lens.geometry(), camera.lens.rim()) {
+        (Geometry::Parallel, _) | (Geometry::Angles, None) => return PI,
+        (Geometry::Plane, rim) => rim.map_or(FRAC_PI_2, f64::atan),
+        (Geometry::Angles, Some(rim)) => rim,
     };
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
     let forward = camera.forward();
@@ -129,7 +128,7 @@ fn half_angle(camera: &Camera) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Bounds;
+    use crate::camera::{Bounds, Lens};
     use crate::photo::{Image, Pixels};
     use glam::{DAffine3, DMat3};
 

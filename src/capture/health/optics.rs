@@ -1,7 +1,7 @@
 //! Focal lengths, fields of view, principal points and lenses, and whether they agree.
 
 use super::{Finding, Scene, Spread};
-use crate::camera::{Camera, LensKind};
+use crate::camera::{Camera, Geometry, LensKind};
 use crate::support::format::{count, percent};
 use glam::{DVec2, dvec2};
 use std::collections::BTreeMap;
@@ -86,7 +86,7 @@ fn fov_degrees(camera: &Camera) -> DVec2 {
 }
 
 fn is_flat(camera: &Camera) -> bool {
-    matches!(camera.lens.kind(), LensKind::Pinhole | LensKind::OpenCv)
+    camera.lens.geometry() == Geometry::Plane
 }
 
 fn odd_focal_lengths(scene: &Scene<'_>) -> Option<Finding> {

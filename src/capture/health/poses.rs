@@ -2,7 +2,7 @@
 
 use super::gaze::Gaze;
 use super::{Finding, Scene, Spread};
-use crate::camera::LensKind;
+use crate::camera::Geometry;
 use crate::capture::dataset::Dataset;
 use crate::support::format::{count, length};
 use glam::DVec3;
@@ -135,7 +135,7 @@ fn away(scene: &Scene<'_>, gaze: &Gaze) -> Vec<usize> {
         let distance = axis.origin.distance(gaze.focus).max(f64::MIN_POSITIVE);
         let half_view = (axis.half_width_at(distance) / distance).atan();
         // Lenses that see all around may point anywhere.
-        let points = !matches!(cameras[view].lens.kind(), LensKind::Fisheye | LensKind::Equirectangular);
+        let points = cameras[view].lens.geometry() != Geometry::Angles;
         points && gaze.off_rad[view] > TURNED_AWAY * half_view
     };
     (0..scene.count()).filter(is_away).collect()
