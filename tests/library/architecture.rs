@@ -254,3 +254,29 @@ fn no_file_imports_in_a_circle() {
     }
     assert!(circles.is_empty(), "{circles:#?}");
 }
+
+/// What the library has to say, its callers hear: it neither writes to the terminal nor ends the program.
+#[test]
+fn the_library_never_prints() {
+    let all = sources();
+    for source in all.iter().filter(|source| !source.is_program(&all)) {
+        let code = source.text.lines().filter(|line| !line.trim_start().starts_with("//"));
+        for line in code {
+            for word in ["println!", "eprint!", "print!(", "stdout()", "stderr()", "process::exit", "dbg!"] {
+                assert!(!line.contains(word), "{} has {word}", source.name());
+            }
+        }
+    }
+}
+
+/// A file is a noun: whoever opens it reads it as a whole.
+#[test]
+fn sources_stay_small() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for folder in ["src", "tests", "benches"] {
+        for path in files(&root.join(folder)) {
+            let lines = std::fs::read_to_string(&path).expect("a source").lines().count();
+            assert!(lines <= 400, "{} has {lines} lines", path.display());
+        }
+    }
+}
