@@ -16,7 +16,7 @@ use crate::narrator::Narrator;
 use crate::remarks::Remarks;
 use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
-use nerf::field::checkpoint::About;
+use nerf::field::checkpoint::Metadata;
 use nerf::gpu::{Gpu, adapter};
 use nerf::run::TrainedField;
 use nerf::support::file::writable_folder;
@@ -76,7 +76,7 @@ impl Session<'_> {
     /// Reads the checkpoint that `run` stands for.
     fn load_field(&self, run: &Path) -> Result<TrainedField> {
         let field = TrainedField::load(run)?;
-        let About { step, seconds, adapter, dataset, .. } = field.about();
+        let Metadata { step, seconds, adapter, dataset, .. } = field.metadata();
         let steps = count(*step as usize, "step");
         let path = field.path.display();
         self.remarks.detail(&format!("{path}: {steps} in {seconds:.1} s on {adapter}, trained on {dataset}"));
@@ -100,7 +100,7 @@ impl Session<'_> {
 }
 
 /// Opens a dataset to compare a field with: the photos are read as the command line says, else as for the training.
-fn open_to_compare(path: &Path, reading: &Reading, about: &About) -> Result<Dataset> {
-    let reading = reading.over(about.reading.clone());
+fn open_to_compare(path: &Path, reading: &Reading, metadata: &Metadata) -> Result<Dataset> {
+    let reading = reading.over(metadata.reading.clone());
     Dataset::open(path, &OpenOptions { reading, ..OpenOptions::default() })
 }

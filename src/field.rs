@@ -41,7 +41,7 @@ pub use workspace::Workspace;
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
 use anyhow::{Result, ensure};
-use checkpoint::{About, Checkpoint};
+use checkpoint::{Checkpoint, Metadata};
 use parameters::Numbers;
 use std::path::Path;
 use std::sync::Arc;
@@ -83,7 +83,7 @@ impl Field {
     /// # Errors
     /// When the adapter cannot hold it.
     pub fn of(gpu: &Arc<Gpu>, checkpoint: &Checkpoint) -> Result<Self> {
-        let mut field = Self::allocate(gpu, checkpoint.about.plan(Capabilities::of(gpu)), false)?;
+        let mut field = Self::allocate(gpu, checkpoint.metadata.plan(Capabilities::of(gpu)), false)?;
         field.arrays.set_arrays(gpu, &field.plan, &checkpoint.state.arrays)?;
         field.step_excess = StepExcess::Known(checkpoint.state.step_excess);
         Ok(field)
@@ -93,9 +93,9 @@ impl Field {
     ///
     /// # Errors
     /// When the file cannot be used, or the adapter cannot hold the field.
-    pub fn load(gpu: &Arc<Gpu>, path: &Path) -> Result<(Self, About)> {
+    pub fn load(gpu: &Arc<Gpu>, path: &Path) -> Result<(Self, Metadata)> {
         let checkpoint = Checkpoint::load(path)?;
-        Ok((Self::of(gpu, &checkpoint)?, checkpoint.about))
+        Ok((Self::of(gpu, &checkpoint)?, checkpoint.metadata))
     }
 
     fn allocate(gpu: &Arc<Gpu>, plan: Plan, is_whole: bool) -> Result<Self> {

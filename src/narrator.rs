@@ -3,7 +3,7 @@
 use crate::progress::{Progress, duration, short};
 use crate::remarks::Remarks;
 use nerf::field::Plan;
-use nerf::field::checkpoint::About;
+use nerf::field::checkpoint::Metadata;
 use nerf::field::optimize::accumulation_name;
 use nerf::gpu::Gpu;
 use nerf::run::memory::Memory;
@@ -21,7 +21,9 @@ pub(crate) struct Narrator {
 impl Observer for Narrator {
     fn notice(&mut self, event: &Event<'_>) {
         match *event {
-            Event::Resolved { about, plan, gpu, test_views } => self.describe(about, plan, gpu, test_views),
+            Event::Resolved { metadata, plan, gpu, test_views } => {
+                self.describe(metadata, plan, gpu, test_views)
+            }
             Event::Memory(memory) => self.say(&memory_line(&memory)),
             Event::Loading { done, all } => self.count("loading", (done, all), "images"),
             Event::Steps(taken) => {
@@ -71,8 +73,8 @@ impl Narrator {
     }
 
     /// Says what was chosen, and what was left out.
-    fn describe(&self, about: &About, plan: &Plan, gpu: &Gpu, test_views: usize) {
-        let About { config, budget, bounds, splits, step, .. } = about;
+    fn describe(&self, metadata: &Metadata, plan: &Plan, gpu: &Gpu, test_views: usize) {
+        let Metadata { config, budget, bounds, splits, step, .. } = metadata;
         let train = count(splits.train.len(), "view");
         self.remarks.say(&format!("{train} to train on, {test_views} to measure on"));
         self.remarks.detail(&format!(

@@ -15,12 +15,12 @@ use serde_json::{Value, json};
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     let field = session.load_field(&args.run)?;
-    let dataset = open_to_compare(&args.dataset, &args.reading, field.about())?;
+    let dataset = open_to_compare(&args.dataset, &args.reading, field.metadata())?;
     let indices = frames(&field, &dataset, args.split, session)?;
     ensure!(
-        dataset.is_hdr == field.about().needs.hdr,
+        dataset.is_hdr == field.metadata().features.hdr,
         "the field was trained on {} images, and {} has {} images; name the dataset it was trained on",
-        range(field.about().needs.hdr),
+        range(field.metadata().features.hdr),
         args.dataset.display(),
         range(dataset.is_hdr)
     );
@@ -64,7 +64,7 @@ fn frames(
     split: Split,
     session: &Session<'_>,
 ) -> Result<Vec<usize>> {
-    let names = field.about().splits.names(split);
+    let names = field.metadata().splits.names(split);
     let (found, missing) = dataset.find(names);
     if found.is_empty() {
         let indices = dataset.split(split).to_vec();
@@ -110,8 +110,8 @@ fn report(args: &Eval, field: &TrainedField, scores: &[Score], means: Means) -> 
         "background": args.background.name(),
         "split": args.split.name(),
         "encoding": "sRGB, clamped to 0..1",
-        "step": field.about().step,
-        "seconds": field.about().seconds,
+        "step": field.metadata().step,
+        "seconds": field.metadata().seconds,
         "views": scores,
     })
 }

@@ -45,12 +45,13 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(jobs.iter().map(|job| &job.camera));
     let mut renderer = field.renderer(&gpu, &lenses)?;
-    let depth_range = depth_range(&field.about().bounds, &jobs);
+    let depth_range = depth_range(&field.metadata().bounds, &jobs);
     let writer = Writer { args, color_space: field.color_space(), depth_range };
     let progress = Progress::new(session.remarks, "rendering");
     let (frames, seconds) = render_and_write(&mut renderer, &jobs, &writer, &progress)?;
     drop(progress);
-    let mut listing = json!({ "checkpoint": field.path.display().to_string(), "step": field.about().step });
+    let mut listing =
+        json!({ "checkpoint": field.path.display().to_string(), "step": field.metadata().step });
     if args.depth {
         listing["depth_near"] = json!(depth_range[0]);
         listing["depth_far"] = json!(depth_range[1]);
@@ -100,8 +101,8 @@ fn render_and_write(
 }
 
 fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
-    let about = field.about();
-    let [width, height] = about.image_size;
+    let metadata = field.metadata();
+    let [width, height] = metadata.image_size;
     let cameras: Vec<(String, Camera)> = match (&args.path.cameras, args.path.orbit) {
         (Some(file), _) => {
             let default_size = [args.width, args.height].into_iter().collect::<Option<Vec<_>>>();
@@ -109,7 +110,7 @@ fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
             read_cameras(file, default_size)?
         }
         (None, count) => {
-            let cameras = about.orbit.cameras(about.bounds.center, count.unwrap_or(1) as usize);
+            let cameras = metadata.orbit.cameras(metadata.bounds.center, count.unwrap_or(1) as usize);
             let named = cameras.into_iter().enumerate();
             named.map(|(index, camera)| (format!("orbit {index}"), camera)).collect()
         }

@@ -21,7 +21,7 @@ pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
         let field = session.load_field(&file)?;
         let trained = std::fs::metadata(&file).and_then(|data| data.modified()).ok();
         let views = views(args, &field, session)?;
-        (Facts { trained, ..Facts::of(folder.path(), field.about())? }, views)
+        (Facts { trained, ..Facts::of(folder.path(), field.metadata())? }, views)
     } else {
         let reason = format!(
             "There is no {} yet: the training ended before it saved, so there is nothing to render.",
@@ -57,11 +57,11 @@ pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
 /// The test views, rendered from the checkpoint, or why they cannot be shown. A dataset that was named must be
 /// there; the one trained on may have moved.
 fn views(args: &Args, field: &TrainedField, session: &Session<'_>) -> Result<Result<TestViews, String>> {
-    let names = &field.about().splits.test;
+    let names = &field.metadata().splits.test;
     if names.is_empty() {
         return Ok(Err("The training held out no test views.".to_owned()));
     }
-    let path = args.dataset.clone().unwrap_or_else(|| PathBuf::from(&field.about().dataset));
+    let path = args.dataset.clone().unwrap_or_else(|| PathBuf::from(&field.metadata().dataset));
     let (dataset, indices, missing) = match open(&path, args, field) {
         Ok(found) => found,
         Err(error) if args.dataset.is_none() => {
@@ -84,13 +84,13 @@ fn views(args: &Args, field: &TrainedField, session: &Session<'_>) -> Result<Res
 
 /// The dataset, its test views as the training had them, and the names of those that it lacks.
 fn open(path: &Path, args: &Args, field: &TrainedField) -> Result<(Dataset, Vec<usize>, Vec<String>)> {
-    let dataset = open_to_compare(path, &args.reading, field.about())?;
+    let dataset = open_to_compare(path, &args.reading, field.metadata())?;
     let show = path.display();
     ensure!(
-        dataset.is_hdr == field.about().needs.hdr,
+        dataset.is_hdr == field.metadata().features.hdr,
         "{show} has images of another kind (display-referred or linear) than the training"
     );
-    let (indices, missing) = dataset.find(&field.about().splits.test);
+    let (indices, missing) = dataset.find(&field.metadata().splits.test);
     let missing = missing.into_iter().map(str::to_owned).collect();
     ensure!(!indices.is_empty(), "none of the training's test views is in {show}");
     Ok((dataset, indices, missing))

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::health::{Severity, Survey};
 use nerf::config::schedule::Budget;
-use nerf::field::checkpoint::{About, Checkpoint};
+use nerf::field::checkpoint::{Checkpoint, Metadata};
 use nerf::run::report::views::TestViews;
 use nerf::run::{
     EvaluationAtEnd, EvaluationOptions, NoTestViews, Resolved, RunFolder, TrainOptions, TrainingEnd,
@@ -55,7 +55,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         "skipped": end.skipped,
         "interrupted": end.interrupted,
     });
-    let mut text = summary(&end, training.about(), &folder);
+    let mut text = summary(&end, training.metadata(), &folder);
     if let Some(outcome) = outcome {
         outcome::add(&mut result, Some(&outcome));
         text = format!("{}; {text}", outcome::describe(&outcome));
@@ -83,7 +83,7 @@ fn folder(args: &Train) -> Result<(RunFolder, Option<Checkpoint>)> {
 
 /// The dataset, read as the command line says, else as before; what looks wrong with it is said.
 fn open(args: &Train, checkpoint: Option<&Checkpoint>, session: &Session<'_>) -> Result<Dataset> {
-    let earlier = checkpoint.map(|checkpoint| checkpoint.about.reading.clone());
+    let earlier = checkpoint.map(|checkpoint| checkpoint.metadata.reading.clone());
     let reading = args.reading.over(earlier.unwrap_or_default());
     let options = OpenOptions { hold_out: args.hold_out, reading, ..OpenOptions::default() };
     let dataset = Dataset::open(&args.dataset, &options)?;
@@ -120,8 +120,8 @@ fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// How the training went, in one line; `about` describes its beginning.
-fn summary(end: &TrainingEnd, about: &About, folder: &str) -> String {
+/// How the training went, in one line; `metadata` describes its beginning.
+fn summary(end: &TrainingEnd, metadata: &Metadata, folder: &str) -> String {
     let steps = count(end.step as usize, "step");
     let mut text = format!("{steps} in {}, saved to {folder}", duration(end.seconds));
     match end.skipped {
@@ -133,13 +133,13 @@ fn summary(end: &TrainingEnd, about: &About, folder: &str) -> String {
         }
     }
     if let Some([first, last]) =
-        end.loss.filter(|[first, last]| about.step == 0 && last != first && *last > 0.5 * first)
+        end.loss.filter(|[first, last]| metadata.step == 0 && last != first && *last > 0.5 * first)
     {
         text += &format!(
             "; the loss has {}, from {first:.4} to {last:.4}: give it more steps, or a smaller \
              optimizer.learning_rate than {}",
             if last > first { "risen" } else { "hardly fallen" },
-            about.config.optimizer.learning_rate
+            metadata.config.optimizer.learning_rate
         );
     }
     if end.interrupted {

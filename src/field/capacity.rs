@@ -62,7 +62,7 @@ impl Rounds {
 
     /// The weight of a colour. Without a bound on the colours there is none on the error of one that stands for
     /// others: in linear light every sample has its own.
-    pub(crate) fn color_weight(&self, needs: &SceneFeatures) -> f64 {
-        if needs.hdr { LEAST_WEIGHT } else { self.color_weight }
+    pub(crate) fn color_weight(&self, features: &SceneFeatures) -> f64 {
+        if features.hdr { LEAST_WEIGHT } else { self.color_weight }
     }
 }

@@ -20,7 +20,7 @@ impl Plan {
         let demands = self
             .training_demands(self.cell_count())
             .into_iter()
-            .chain(self.for_views(&self.needs.lenses).viewing_demands());
+            .chain(self.for_views(&self.features.lenses).viewing_demands());
         for demand in demands {
             demand
                 .check(gpu)

@@ -166,14 +166,14 @@ impl Plan {
     /// What the device keeps of a pixel.
     #[must_use]
     pub fn record(&self) -> Record {
-        let needs = &self.needs;
-        let color = match (needs.hdr, needs.deep) {
+        let features = &self.features;
+        let color = match (features.hdr, features.deep) {
             (true, _) => 4,
             (false, true) => 2,
             (false, false) => 1,
         };
-        let is_opaque = color == 1 && !needs.alpha;
-        Record { color, is_opaque, has_position: needs.masks, has_depth: needs.depth }
+        let is_opaque = color == 1 && !features.alpha;
+        Record { color, is_opaque, has_position: features.masks, has_depth: features.depth }
     }
 
     /// Bytes of all photos of these numbers of pixels.

@@ -78,7 +78,7 @@ impl Renderer {
     /// Bytes on the device that a renderer of `plan` takes besides the parameters.
     #[must_use]
     pub fn bytes(plan: &Plan) -> u64 {
-        plan.for_views(&plan.needs.lenses).viewing_demands().iter().map(Demand::bytes).sum()
+        plan.for_views(&plan.features.lenses).viewing_demands().iter().map(Demand::bytes).sum()
     }
 
     /// Renders what `camera` sees.
@@ -86,7 +86,7 @@ impl Renderer {
     /// # Errors
     /// When the device was lost, or the camera has a lens that was not linked.
     pub fn render(&mut self, camera: &Camera) -> Result<View> {
-        let (kind, lenses) = (camera.lens.kind(), &self.plan.needs.lenses);
+        let (kind, lenses) = (camera.lens.kind(), &self.plan.features.lenses);
         if !lenses.contains(&kind) {
             let linked: Vec<_> = lenses.iter().map(|kind| kind.name()).collect();
             bail!(
@@ -111,7 +111,7 @@ impl Renderer {
             color.extend(pixels.iter().map(|&[r, g, b, alpha, _]| [r, g, b, alpha]));
             depth.extend(pixels.iter().map(|&[.., depth]| depth));
         }
-        let grey = self.plan.needs.grey;
+        let grey = self.plan.features.grey;
         color.iter_mut().flat_map(|pixel| &mut pixel[..3]).for_each(|value| *value *= grey);
         let world_per_box = self.plan.space.world_per_box() as f32;
         depth.iter_mut().for_each(|z| *z *= world_per_box);

@@ -64,7 +64,7 @@ impl Views {
             banks,
             gpu: Arc::clone(gpu),
             record,
-            units: Units { color: 1.0 / plan.needs.grey, depth: plan.space.cubes_per_world() as f32 },
+            units: Units { color: 1.0 / plan.features.grey, depth: plan.space.cubes_per_world() as f32 },
             row: 0,
         })
     }

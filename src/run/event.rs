@@ -4,7 +4,7 @@ use super::memory::Memory;
 use super::scores::Means;
 use super::stepper::Block;
 use crate::field::Plan;
-use crate::field::checkpoint::About;
+use crate::field::checkpoint::Metadata;
 use crate::gpu::Gpu;
 use crate::support::format::{count, few};
 use std::fmt;
@@ -27,7 +27,7 @@ pub enum Event<'a> {
     /// It is known what is trained on which device; nothing was loaded yet.
     Resolved {
         /// What the run's checkpoints say, at the first step of this session.
-        about: &'a About,
+        metadata: &'a Metadata,
         /// How the kernels are linked.
         plan: &'a Plan,
         /// The device.

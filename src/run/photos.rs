@@ -50,7 +50,7 @@ impl<'a> TrainingPhotos<'a> {
         let mut views = Views::new(gpu, plan, &self.cameras())?;
         let mut ignored = Vec::new();
         observer.notice(&Event::Loading { done: 0, all: frames.len() });
-        dataset.stream(frames, plan.needs.depth, &mut |position, photo| {
+        dataset.stream(frames, plan.features.depth, &mut |position, photo| {
             if photo.is_ignored() {
                 ignored.push(dataset.frames[frames[position]].name.as_str());
             }

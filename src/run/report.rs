@@ -12,7 +12,7 @@ pub mod pictures;
 mod time;
 pub mod views;
 
-use crate::field::checkpoint::About;
+use crate::field::checkpoint::Metadata;
 use crate::run::log::Log;
 use crate::support::file::write_atomically;
 use anyhow::{Context, Result};
@@ -51,18 +51,18 @@ impl Facts {
     ///
     /// # Errors
     /// Never for settings that were read or resolved.
-    pub fn of(folder: &Path, about: &About) -> Result<Self> {
+    pub fn of(folder: &Path, metadata: &Metadata) -> Result<Self> {
         Ok(Self {
             run: folder.display().to_string(),
-            dataset: Some(about.dataset.clone()),
+            dataset: Some(metadata.dataset.clone()),
             trained: None,
-            adapter: Some(about.adapter.clone()),
-            steps: Some(u64::from(about.step)),
-            seconds: Some(about.seconds),
-            is_done: Some(about.budget.is_spent(about.step, about.seconds)),
-            train_views: Some(about.splits.train.len()),
-            hdr: about.needs.hdr,
-            settings: Some(serde_json::to_string_pretty(&about.config)?),
+            adapter: Some(metadata.adapter.clone()),
+            steps: Some(u64::from(metadata.step)),
+            seconds: Some(metadata.seconds),
+            is_done: Some(metadata.budget.is_spent(metadata.step, metadata.seconds)),
+            train_views: Some(metadata.splits.train.len()),
+            hdr: metadata.features.hdr,
+            settings: Some(serde_json::to_string_pretty(&metadata.config)?),
         })
     }
 }

@@ -46,7 +46,7 @@ fn definitions(text: &str) -> Vec<String> {
 fn plan(memory: Memory, cascades: u32) -> Plan {
     let mut config = Config::default();
     config.grid.finest = 2048;
-    let needs = SceneFeatures { alpha: true, ..SceneFeatures::default() };
+    let features = SceneFeatures { alpha: true, ..SceneFeatures::default() };
     let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades, source: String::new() };
     let product = Product { rows: 2, shared_weights: false };
     let adapter = Capabilities { memory, ..Capabilities::GPU };
@@ -54,7 +54,7 @@ fn plan(memory: Memory, cascades: u32) -> Plan {
         product,
         accumulation: Accumulation::Exchange,
         chunks: 32,
-        ..Plan::suited_to(adapter, config, needs, Space::from(&bounds))
+        ..Plan::suited_to(adapter, config, features, Space::from(&bounds))
     }
 }
 
@@ -264,7 +264,7 @@ fn every_combination_links() {
 fn every_set_of_lenses_links() {
     let mut linker = Linker::new(plan(Memory::Buffers, 1));
     for lenses in lens_sets() {
-        linker.plan.needs.lenses = lenses;
+        linker.plan.features.lenses = lenses;
         // Rays of a view begin, and their samples are told their depth.
         let of_view = [
             ("counted", "read"),

@@ -93,13 +93,13 @@ impl Scene {
         let adapter = adapter::choose(choice.as_deref()).expect("an adapter");
         let gpu = Arc::new(Gpu::open(&adapter).expect("it opens"));
         let (cameras, images, bounds) = (self.cameras(), self.images(), self.bounds());
-        let needs = SceneFeatures {
+        let features = SceneFeatures {
             lenses: LensKind::among(&cameras),
             alpha: self.has_alpha,
             hdr: images.iter().any(Image::is_hdr),
             ..SceneFeatures::default()
         };
-        let plan = Plan::new(&gpu, config, needs, Space::from(&bounds));
+        let plan = Plan::new(&gpu, config, features, Space::from(&bounds));
         let mut views = Views::new(&gpu, &plan, &cameras).expect("room");
         images.into_iter().for_each(|image| views.add(&image.into()).expect("its photo"));
         let trainer = Trainer::new(Field::new(&gpu, plan).expect("a field"), views).expect("a trainer");
@@ -152,7 +152,7 @@ impl Training {
     #[track_caller]
     fn finite_view(&self) -> View {
         let field = self.trainer.field();
-        let mut renderer = Renderer::new(field, &field.plan().needs.lenses).expect("a renderer");
+        let mut renderer = Renderer::new(field, &field.plan().features.lenses).expect("a renderer");
         let view = renderer.render(&self.camera).expect("a view");
         assert!(view.color.as_flattened().iter().chain(&view.depth).all(|value| value.is_finite()));
         view

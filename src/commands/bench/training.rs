@@ -73,13 +73,13 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
             "dataset": args.dataset.display().to_string(),
             "train_views": dataset.train.len(),
             "test_views": dataset.test.len(),
-            "budget": entries.first().map(|entry| entry.resolved.about.budget),
+            "budget": entries.first().map(|entry| entry.resolved.metadata.budget),
             "clock": CLOCK,
         }),
     );
     let mut runs = Vec::new();
     for (number, entry) in entries.iter().enumerate() {
-        let seed = entry.resolved.about.config.seed;
+        let seed = entry.resolved.metadata.config.seed;
         session.remarks.say(&format!(
             "run {} of {}: {}, seed {seed}",
             number + 1,
@@ -149,9 +149,9 @@ impl Course<'_> {
         let mut evaluator = evaluator.context("the dataset has no test views")?;
         let compile_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let stepper = Stepper::new(trainer, StepClock::new(&resolved.about, 0.0));
+        let stepper = Stepper::new(trainer, StepClock::new(&resolved.metadata, 0.0));
         let curve = follow(stepper, &mut evaluator, &resolved.test, session.remarks)?;
-        let settings = resolved.about.config.clone();
+        let settings = resolved.metadata.config.clone();
         Ok(Run {
             config: entry.config.clone(),
             seed: settings.seed,

@@ -1,7 +1,7 @@
 //! The end of a session: the test views are measured, and the page about the run is written.
 
 use super::{TrainingEnd, TrainingSession};
-use crate::field::checkpoint::About;
+use crate::field::checkpoint::Metadata;
 use crate::run::event::Observer;
 use crate::run::log::{self, LogRow};
 use crate::run::options::EvaluationAtEnd;
@@ -43,7 +43,8 @@ impl TrainingSession<'_> {
         };
         let clock = Instant::now();
         // What is to be the same again must not depend on the clock.
-        let is_limited = self.evaluation.at_end == EvaluationAtEnd::Share && !self.about.config.deterministic;
+        let is_limited =
+            self.evaluation.at_end == EvaluationAtEnd::Share && !self.metadata.config.deterministic;
         let limit = is_limited.then_some(EVALUATION_SHARE * end.seconds);
         let views = TestViews::measure(evaluator, &self.test, limit, observer)?;
         if let Some(outcome) = views.outcome() {
@@ -66,8 +67,8 @@ impl TrainingSession<'_> {
     /// # Errors
     /// When the log cannot be read, a chart cannot be drawn, or the page cannot be written.
     pub fn write_report(&self, end: &TrainingEnd, views: Result<TestViews, String>) -> Result<PathBuf> {
-        let about = About { step: end.step, seconds: end.seconds, ..self.about.clone() };
-        let facts = Facts { trained: Some(SystemTime::now()), ..Facts::of(self.folder.path(), &about)? };
+        let metadata = Metadata { step: end.step, seconds: end.seconds, ..self.metadata.clone() };
+        let facts = Facts { trained: Some(SystemTime::now()), ..Facts::of(self.folder.path(), &metadata)? };
         let out = self.folder.report();
         Report { facts, log: self.folder.log()?, views }.save(&out)?;
         Ok(out)

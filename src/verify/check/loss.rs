@@ -70,7 +70,7 @@ impl Case {
         for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
             let mut setup = Setup::tiny().transmittance(convention);
             setup.config.loss = self.loss.clone();
-            setup.needs.depth = true;
+            setup.features.depth = true;
             (setup.config.batch.kept, setup.config.batch.samples) = (8192, 8192);
             let bench = subject.workbench(setup)?;
             let mut random = Random::new(73);

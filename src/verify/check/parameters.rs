@@ -160,8 +160,8 @@ impl Workbench {
             config::Transmittance::Exclusive => Transmittance::Exclusive,
             config::Transmittance::Inclusive => Transmittance::Inclusive,
         };
-        let color_range = if self.plan.needs.hdr { ColorRange::Hdr } else { ColorRange::Ldr };
-        let depth = if self.plan.needs.depth { self.plan.config.loss.depth } else { 0.0 };
+        let color_range = if self.plan.features.hdr { ColorRange::Hdr } else { ColorRange::Ldr };
+        let depth = if self.plan.features.depth { self.plan.config.loss.depth } else { 0.0 };
         let config::Loss { distortion, sparsity, .. } = self.plan.config.loss;
         let loss = Loss { is_relative: self.plan.has_relative_loss(), depth, distortion, sparsity };
         Objective { transmittance, color_range, loss }

@@ -25,7 +25,7 @@ impl Probe<'_> {
     ) -> Result<Vec<[[f32; 4]; OUTPUTS]>> {
         let gpu = &subject.gpu;
         let mut setup = Setup::tiny();
-        setup.needs.lenses = LensKind::ALL.into();
+        setup.features.lenses = LensKind::ALL.into();
         let plan = subject.setup(setup).plan(gpu)?;
         let cases = inputs.len();
         let text = format!(

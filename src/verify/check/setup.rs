@@ -19,7 +19,7 @@ pub struct Setup {
     /// Sizes and constants of the field.
     pub config: Config,
     /// What the scene needs.
-    pub needs: SceneFeatures,
+    pub features: SceneFeatures,
     /// The scene's box.
     pub bounds: Bounds,
     /// How matrix products are written; `None` as the plan chooses.
@@ -51,9 +51,9 @@ impl Setup {
             seed: SEED,
             ..Config::default()
         };
-        let needs = SceneFeatures { alpha: true, ..SceneFeatures::default() };
+        let features = SceneFeatures { alpha: true, ..SceneFeatures::default() };
         let bounds = Bounds { center: DVec3::splat(0.5), half: 0.5, cascades: 1, source: "unit cube".into() };
-        Self { config, needs, bounds, product: None, memory: None }
+        Self { config, features, bounds, product: None, memory: None }
     }
 
     /// With hidden layers of `width`, `color_layers` of them in the colour network.
@@ -73,7 +73,7 @@ impl Setup {
     /// With linear light where `hdr`.
     #[must_use]
     pub fn hdr(mut self, hdr: bool) -> Self {
-        self.needs.hdr = hdr;
+        self.features.hdr = hdr;
         self
     }
 
@@ -101,7 +101,7 @@ impl Setup {
     pub fn plan(&self, gpu: &Gpu) -> Result<Plan> {
         self.config.validate()?;
         let space = Space::from(&self.bounds);
-        let mut plan = Plan::new(gpu, self.config.clone(), self.needs.clone(), space);
+        let mut plan = Plan::new(gpu, self.config.clone(), self.features.clone(), space);
         plan.product = self.product.unwrap_or(plan.product);
         plan.memory = self.memory.unwrap_or(plan.memory);
         Ok(plan)

@@ -42,7 +42,7 @@ pub fn setups() -> [(&'static str, Setup); 5] {
     let cascades = Setup::tiny().network(32, 1).hdr(true).cascades(3);
     let mut masks = Setup::tiny();
     masks.config.loss = Loss { depth: 0.3, distortion: 0.02, sparsity: 0.01, ..Loss::default() };
-    (masks.needs.deep, masks.needs.masks, masks.needs.depth) = (true, true, true);
+    (masks.features.deep, masks.features.masks, masks.features.depth) = (true, true, true);
     [
         ("plain", Setup::tiny()),
         ("random background", random_background),
@@ -168,7 +168,8 @@ impl TinyTraining {
         setup.config.batch.kept = 1024;
         setup.config.batch.samples = 4096;
         let mut random = Random::new(80);
-        let photos: Vec<_> = cameras.iter().map(|camera| photo(&mut random, camera, &setup.needs)).collect();
+        let photos: Vec<_> =
+            cameras.iter().map(|camera| photo(&mut random, camera, &setup.features)).collect();
         let plan = setup.plan(&subject.gpu)?;
         let mut views = Views::new(&subject.gpu, &plan, &cameras)?;
         photos.iter().try_for_each(|photo| views.add(photo))?;
@@ -282,12 +283,12 @@ fn cameras() -> Vec<Camera> {
 
 /// About one colour with a little noise: something that a tiny field can learn. Some pixels are ignored, and of some
 /// the depth is not known.
-fn photo(random: &mut Random, camera: &Camera, needs: &SceneFeatures) -> Photo {
+fn photo(random: &mut Random, camera: &Camera, features: &SceneFeatures) -> Photo {
     let count = camera.width * camera.height;
-    let pixels = if needs.hdr {
+    let pixels = if features.hdr {
         let pixel = |_| [4.0, 2.5, 0.5, 0.9].map(|x| (x * random.number(0.8, 1.0)) as f32);
         Pixels::Linear((0..count).map(pixel).collect())
-    } else if needs.deep {
+    } else if features.deep {
         let pixel = |_| [65_000.0, 40_000.0, 5_000.0, 60_000.0].map(|x| (x * random.number(0.8, 1.0)) as u16);
         Pixels::Srgb16((0..count).map(pixel).collect())
     } else {
@@ -296,10 +297,10 @@ fn photo(random: &mut Random, camera: &Camera, needs: &SceneFeatures) -> Photo {
     };
     let image = Image { width: camera.width, height: camera.height, pixels, has_alpha: true };
     let mut photo = Photo::from(image);
-    if needs.masks {
+    if features.masks {
         photo.ignored = (0..count).map(|pixel| pixel % 3 == 0).collect();
     }
-    if needs.depth {
+    if features.depth {
         let depth = |pixel| if pixel % 5 == 0 { 0.0 } else { random.number(1.0, 2.0) as f32 };
         photo.depth = (0..count).map(depth).collect();
     }

@@ -65,11 +65,11 @@ pub fn training_rays(subject: &Subject) -> Result<Tally> {
         (Background::White, kind(true, false, true, true, true)),
         (Background::Color([0.25, 0.5, 0.75]), kind(false, false, false, false, false)),
     ];
-    for (background, needs) in kinds {
+    for (background, features) in kinds {
         let mut setup = Setup::tiny();
         setup.config.background = background;
         let lenses = LENSES.iter().map(Lens::kind).collect();
-        setup.needs = SceneFeatures { lenses, ..needs };
+        setup.features = SceneFeatures { lenses, ..features };
         setup.bounds = bounds();
         let mut bench = subject.workbench(setup)?;
         let photos = Photos::upload(&mut bench, &mut Random::new(41))?;
@@ -77,7 +77,7 @@ pub fn training_rays(subject: &Subject) -> Result<Tally> {
         for count in [1, 3, 65, 250] {
             bench.set_rays(count);
             bench.run([&stage])?;
-            let case = format!("{background:?}, {:?}, {count} rays", bench.plan.needs);
+            let case = format!("{background:?}, {:?}, {count} rays", bench.plan.features);
             photos.compare(&mut tally, &case, &bench, count)?;
         }
     }
@@ -88,8 +88,8 @@ impl Photos {
     fn upload(bench: &mut Workbench, random: &mut Random) -> Result<Self> {
         let cameras: Vec<_> =
             SIZES.iter().zip(LENSES).map(|(&size, lens)| camera(random, size, lens)).collect();
-        let needs = bench.plan.needs.clone();
-        let photos: Vec<_> = SIZES.iter().map(|&size| photo(random, size, &needs)).collect();
+        let features = bench.plan.features.clone();
+        let photos: Vec<_> = SIZES.iter().map(|&size| photo(random, size, &features)).collect();
         let record = bench.plan.record();
         let (mut words, mut on_device, mut counting) = (Vec::new(), Vec::new(), Vec::new());
         for (camera, photo) in cameras.iter().zip(&photos) {
@@ -112,7 +112,7 @@ impl Photos {
 
     fn compare(&self, tally: &mut Tally, case: &str, bench: &Workbench, count: usize) -> Result<()> {
         let targets: Vec<RayTarget> = bench.read("ray_targets", count)?;
-        let needs = &bench.plan.needs;
+        let features = &bench.plan.features;
         let pixels: Vec<u32> = self.counting.iter().map(|counting| counting.len() as u32).collect();
         for (index, ray) in DeviceRay::read(bench, count)?.into_iter().enumerate() {
             let case = format!("{case}, ray {index}");
@@ -123,7 +123,7 @@ impl Photos {
                 DVec2::new(f64::from(texel % camera.width) + 0.5, f64::from(texel / camera.width) + 0.5);
             if let Some(want) = camera.ray(pixel).filter(|_| !is_close_to_a_fold(camera, pixel)) {
                 tally.each(&case, &ray.direction.to_array(), &want.direction.to_array(), |_| 1.0);
-                if needs.depth {
+                if features.depth {
                     let depth = f64::from(photo.depth[texel as usize] * UNITS.depth);
                     let distance = depth / camera.depth_of_unit(want.direction);
                     tally.value(targets[index].depth.into(), distance, 1.0 + distance, || {
@@ -140,7 +140,7 @@ impl Photos {
                 }
                 solid => solid.solid().map(f64::from),
             };
-            let [r, g, b, alpha] = target(&photo.image.pixels, texel as usize, needs.alpha);
+            let [r, g, b, alpha] = target(&photo.image.pixels, texel as usize, features.alpha);
             let over = |color: f64, channel: usize| color + (1.0 - alpha) * behind[channel];
             let target = [over(r, 0), over(g, 1), over(b, 2), alpha];
             tally.each(&format!("{case}, target"), &targets[index].color, &target, |_| 1.0);
@@ -151,22 +151,22 @@ impl Photos {
 }
 
 /// Random pixels, of which some are ignored and some have no depth.
-fn photo(random: &mut Random, (width, height): (u32, u32), needs: &SceneFeatures) -> Photo {
+fn photo(random: &mut Random, (width, height): (u32, u32), features: &SceneFeatures) -> Photo {
     let count = width * height;
     let mut values = |most: f64| -> [f64; 4] { std::array::from_fn(|_| random.number(0.0, most)) };
-    let pixels = if needs.hdr {
+    let pixels = if features.hdr {
         Pixels::Linear((0..count).map(|_| values(4.0).map(|x| x as f32)).collect())
-    } else if needs.deep {
+    } else if features.deep {
         Pixels::Srgb16((0..count).map(|_| values(65_536.0).map(|x| x as u16)).collect())
     } else {
         Pixels::Srgb8((0..count).map(|_| values(256.0).map(|x| x as u8)).collect())
     };
-    let mut photo = Photo::from(Image { width, height, pixels, has_alpha: needs.alpha });
-    if needs.masks {
+    let mut photo = Photo::from(Image { width, height, pixels, has_alpha: features.alpha });
+    if features.masks {
         // The pixel of the smallest photo counts.
         photo.ignored = (0..count).map(|pixel| pixel % 3 == 1).collect();
     }
-    if needs.depth {
+    if features.depth {
         let depth = |pixel| if pixel % 4 == 0 { 0.0 } else { random.number(0.5, 9.0) as f32 };
         photo.depth = (0..count).map(depth).collect();
     }

@@ -123,7 +123,7 @@ struct Bench {
 impl Bench {
     fn new(subject: &Subject, lenses: &[LensKind], rays: usize) -> Result<Self> {
         let mut setup = Setup::tiny();
-        setup.needs.lenses = lenses.iter().copied().collect();
+        setup.features.lenses = lenses.iter().copied().collect();
         setup.bounds = super::bounds();
         setup.config.batch.rays = rays;
         let mut bench = subject.workbench(setup)?;
