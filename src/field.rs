@@ -1,10 +1,10 @@
 //! The radiance field on a device: its parameters and kernels, training it and rendering it.
 
+mod buffers;
 mod capabilities;
 pub mod capacity;
 pub mod checkpoint;
 mod constants;
-mod demands;
 pub mod dispatch;
 mod features;
 mod kernels;
@@ -100,7 +100,7 @@ impl Field {
 
     fn allocate(gpu: &Arc<Gpu>, plan: Plan, is_whole: bool) -> Result<Self> {
         let mut arrays = Workspace::default();
-        arrays.allocate(gpu, &plan.field_demands(is_whole))?;
+        arrays.allocate(gpu, &plan.field_buffers(is_whole))?;
         arrays.write(gpu, "levels", &plan.layout.levels);
         Ok(Self { gpu: Arc::clone(gpu), plan, arrays, is_whole, step_excess: StepExcess::Known(0.0) })
     }

@@ -3,10 +3,10 @@
 //! Nothing here knows what a radiance field is.
 
 pub mod adapter;
-pub mod banks;
 pub mod buffer;
-pub mod demand;
+pub mod buffer_spec;
 pub mod kernel;
+pub mod paged_array;
 pub mod pass;
 pub mod source;
 pub mod tensor;

@@ -6,7 +6,7 @@ use nerf::field::Plan;
 use nerf::field::checkpoint::Metadata;
 use nerf::field::optimize::accumulation_name;
 use nerf::gpu::Gpu;
-use nerf::run::memory::Memory;
+use nerf::run::memory::MemoryUse;
 use nerf::run::{Event, Observer, StepsTaken};
 use nerf::support::format::{bytes, count};
 
@@ -105,7 +105,7 @@ impl Narrator {
     }
 }
 
-fn memory_line(memory: &Memory) -> String {
+fn memory_line(memory: &MemoryUse) -> String {
     let [host, device, photos] = [memory.host_bytes, memory.device_bytes, memory.photo_bytes].map(bytes);
     format!("memory: {host} on the host, {device} on the device, {photos} of it photos")
 }

@@ -4,7 +4,7 @@
 use super::Plan;
 use super::layout::{FEATURES, Layout};
 use crate::config::Optimizer;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::tensor::Element;
 
 /// A group of parameters.
@@ -113,7 +113,7 @@ pub static GROUPS: &[Group] = &[
     },
     Group {
         name: "occupancy_bits",
-        place: Place::Tensor(Element::Word),
+        place: Place::Tensor(Element::U32),
         shape: |plan| vec![plan.cell_count() / 32],
         start: Start::Cells(occupancy_bits),
         rendered: true,
@@ -185,7 +185,7 @@ impl Array {
     /// Whether its numbers are words.
     #[must_use]
     pub fn has_words(&self) -> bool {
-        self.place == Place::Tensor(Element::Word)
+        self.place == Place::Tensor(Element::U32)
     }
 
     /// What it holds before the first step of a training where nothing can be in the `hidden` cells.
@@ -200,11 +200,11 @@ impl Array {
 
     /// Its room on the device.
     #[must_use]
-    pub fn demand(&self, plan: &Plan) -> Demand {
+    pub fn spec(&self, plan: &Plan) -> BufferSpec {
         match self.place {
             Place::Tensor(element) => plan.tensor(self.name, element, self.count() * 4 / element.bytes()),
-            Place::Uniform => Demand::uniform_storage::<u32>(self.name, self.count()),
-            Place::Storage => Demand::storage::<u32>(self.name, self.count()),
+            Place::Uniform => BufferSpec::uniform_storage::<u32>(self.name, self.count()),
+            Place::Storage => BufferSpec::storage::<u32>(self.name, self.count()),
         }
     }
 }
@@ -267,7 +267,7 @@ mod tests {
             let start = array.start(&plan, &hidden);
             assert_eq!(start.count(), array.count(), "{}", array.name);
             assert_eq!(array.has_words(), matches!(start, Numbers::Words(_)));
-            assert_eq!(array.demand(&plan).bytes(), 4 * array.count() as u64);
+            assert_eq!(array.spec(&plan).bytes(), 4 * array.count() as u64);
         }
         assert_eq!(occupancy(&plan, &hidden).floats()[33], -1.0);
         assert_eq!(occupancy_bits(&plan, &hidden), Numbers::Words([&[!0, !2][..], &vec![!0; 254]].concat()));

@@ -6,7 +6,7 @@ use super::{Capabilities, Capacity, SceneFeatures, Space, layer};
 use crate::camera::LensKind;
 use crate::config::{Accumulation, ColorLoss, Config};
 use crate::gpu::Gpu;
-use crate::gpu::tensor::Memory;
+use crate::gpu::tensor::TensorMemory;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub struct Plan {
     /// How the table's gradients are summed.
     pub accumulation: Accumulation,
     /// Where tensors live.
-    pub memory: Memory,
+    pub memory: TensorMemory,
     /// Chunks of samples whose weight gradients are summed apart: what runs side by side.
     pub chunks: usize,
     /// How much of a view is in work at once.

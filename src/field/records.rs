@@ -4,7 +4,7 @@
 //! then its depth where depth is trained on. Ignored pixels have no record, so they are never drawn.
 
 use super::Plan;
-use crate::gpu::banks::{self, rows_of};
+use crate::gpu::paged_array::{self, rows_of};
 use crate::photo::{BitDepth, Photo, Pixels};
 use anyhow::{Result, ensure};
 use std::borrow::Cow;
@@ -53,7 +53,7 @@ impl Record {
         self.color + usize::from(self.has_position)
     }
 
-    /// Rows of the banks that a photo of `pixels` pixels takes at most.
+    /// Rows of the pages that a photo of `pixels` pixels takes at most.
     #[must_use]
     pub fn rows(&self, pixels: usize) -> usize {
         rows_of(pixels * self.words())
@@ -179,7 +179,7 @@ impl Plan {
     /// Bytes of all photos of these numbers of pixels.
     #[must_use]
     pub fn photo_bytes(&self, pixels: impl Iterator<Item = usize>) -> u64 {
-        banks::bytes_of(pixels.map(|pixels| self.record().rows(pixels)).sum())
+        paged_array::bytes_of(pixels.map(|pixels| self.record().rows(pixels)).sum())
     }
 }
 

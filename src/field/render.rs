@@ -5,7 +5,7 @@ use crate::field::{
     self, Counters, Field, Plan, Progress, StepExcess, Workspace, color, density, dispatch, march, viewing,
 };
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use anyhow::{Result, bail};
 use std::collections::BTreeSet;
@@ -57,7 +57,7 @@ impl Renderer {
         let (gpu, plan) = (&field.gpu, field.plan.for_views(lenses));
         let mut workspace = Workspace::default();
         workspace.share(&field.arrays);
-        workspace.allocate(gpu, &plan.viewing_demands())?;
+        workspace.allocate(gpu, &plan.viewing_buffers())?;
         let refill = march::scan(gpu, &plan, &workspace, march::Scanned::Free)?;
         let mut round = vec![viewing::rays(gpu, &plan, &workspace)?];
         round.extend(march::stages_over(gpu, &plan, &workspace, false, march::Extent::Round)?);
@@ -78,7 +78,7 @@ impl Renderer {
     /// Bytes on the device that a renderer of `plan` takes besides the parameters.
     #[must_use]
     pub fn bytes(plan: &Plan) -> u64 {
-        plan.for_views(&plan.features.lenses).viewing_demands().iter().map(Demand::bytes).sum()
+        plan.for_views(&plan.features.lenses).viewing_buffers().iter().map(BufferSpec::bytes).sum()
     }
 
     /// Renders what `camera` sees.

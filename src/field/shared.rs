@@ -157,7 +157,7 @@ gpu_struct! {
         height: u32,
         /// +Y axis.
         up: [f32; 3],
-        /// The photo's first row in the banks.
+        /// The photo's first row in the pages.
         first_row: u32,
         /// +Z axis, away from the view.
         back: [f32; 3],

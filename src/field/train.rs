@@ -67,7 +67,7 @@ impl Trainer {
             (0..).zip(&hidden).filter(|(_, hidden)| !**hidden).map(|(cell, _)| cell).collect();
         let mut workspace = Workspace::for_training(&field, &visible)?;
         workspace.add(gpu.storage_with("cameras", &views.on_device)?);
-        workspace.add_banks(views.banks);
+        workspace.add_pages(views.pages);
         let stages = step_stages(&gpu, &plan, &workspace, views.on_device.len())?;
         let occupancy = occupancy::Update::new(&gpu, &plan, &workspace)?;
         let visible_cells = visible.len() as u32;

@@ -6,7 +6,7 @@ use crate::field::records::{self, Record, Units};
 use crate::field::silhouette::Silhouette;
 use crate::field::{self, Plan};
 use crate::gpu::Gpu;
-use crate::gpu::banks::{Banks, Capacity, rows_of};
+use crate::gpu::paged_array::{PageCapacity, PagedArray, rows_of};
 use crate::photo::Photo;
 use crate::photo::nothing_counts;
 use crate::support::remedy::{Advised, Remedy};
@@ -22,7 +22,7 @@ pub struct Views {
     pub(crate) silhouettes: Vec<Silhouette>,
     /// In box space; one per photo of which a pixel can be drawn.
     pub(crate) on_device: Vec<field::Camera>,
-    pub(crate) banks: Banks,
+    pub(crate) pages: PagedArray,
     gpu: Arc<Gpu>,
     record: Record,
     units: Units,
@@ -36,14 +36,14 @@ impl Views {
     /// # Errors
     /// When the adapter cannot hold them.
     pub fn new(gpu: &Arc<Gpu>, plan: &Plan, cameras: &[Camera]) -> Result<Self> {
-        Self::within(gpu, plan, cameras, Capacity::of(&gpu.device.limits(), plan.memory))
+        Self::within(gpu, plan, cameras, PageCapacity::of(&gpu.device.limits(), plan.memory))
     }
 
     /// As [`Views::new`], divided as `capacity` says.
     ///
     /// # Errors
     /// As [`Views::new`].
-    pub fn within(gpu: &Arc<Gpu>, plan: &Plan, cameras: &[Camera], capacity: Capacity) -> Result<Self> {
+    pub fn within(gpu: &Arc<Gpu>, plan: &Plan, cameras: &[Camera], capacity: PageCapacity) -> Result<Self> {
         let record = plan.record();
         let pixels = |camera: &Camera| camera.width as usize * camera.height as usize;
         let rows = cameras.iter().map(|camera| record.rows(pixels(camera))).sum();
@@ -51,7 +51,7 @@ impl Views {
             let remedy = Remedy::HalveOrThinOut { most_images: cameras.len() / 2 };
             bail!(Advised::new("the photos are too large to be addressed; ", remedy, ""));
         }
-        let banks = Banks::new(gpu, records::NAME, rows, capacity).context(Advised::new(
+        let pages = PagedArray::new(gpu, records::NAME, rows, capacity).context(Advised::new(
             "",
             Remedy::FewerPixels,
             "",
@@ -61,7 +61,7 @@ impl Views {
             space: plan.space,
             silhouettes: Vec::with_capacity(cameras.len()),
             on_device: Vec::with_capacity(cameras.len()),
-            banks,
+            pages,
             gpu: Arc::clone(gpu),
             record,
             units: Units { color: 1.0 / plan.features.grey, depth: plan.space.cubes_per_world() as f32 },
@@ -88,7 +88,7 @@ impl Views {
             camera.height
         );
         let records = self.record.of(photo, self.units).with_context(|| format!("photo {number}"))?;
-        self.banks.write(&self.gpu, self.row, &records)?;
+        self.pages.write(&self.gpu, self.row, &records)?;
         let pixel_count = (records.len() / self.record.words()) as u32;
         if pixel_count > 0 {
             let first_row = self.row as u32;

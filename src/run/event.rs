@@ -1,6 +1,6 @@
 //! What a run tells while it goes on: one list of events, and who listens.
 
-use super::memory::Memory;
+use super::memory::MemoryUse;
 use super::scores::Means;
 use super::stepper::Block;
 use crate::field::Plan;
@@ -36,7 +36,7 @@ pub enum Event<'a> {
         test_views: usize,
     },
     /// What the training takes of the memory, before it is taken.
-    Memory(Memory),
+    Memory(MemoryUse),
     /// So many training photos are on the device.
     Loading {
         /// So many, from 0 on.

@@ -1,7 +1,7 @@
 //! The training photos on their way from files to the device.
 
 use super::event::{Event, Observer, Warning};
-use super::memory::Memory;
+use super::memory::MemoryUse;
 use crate::camera::Camera;
 use crate::capture::dataset::Dataset;
 use crate::config::Config;
@@ -36,8 +36,8 @@ impl<'a> TrainingPhotos<'a> {
 
     /// What training on them takes of the host's memory and of the device's.
     #[must_use]
-    pub fn memory(&self, plan: &Plan) -> Memory {
-        Memory::of_training(plan, &self.cameras(), self.dataset.stream_bytes(self.frames))
+    pub fn memory(&self, plan: &Plan) -> MemoryUse {
+        MemoryUse::of_training(plan, &self.cameras(), self.dataset.stream_bytes(self.frames))
     }
 
     /// Decodes them, a few at a time, and puts them on the device. Masks, alpha, depth and bits come along as far as

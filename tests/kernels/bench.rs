@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use nerf::config::Accumulation;
 use nerf::field::layer::Product;
-use nerf::gpu::tensor::Memory;
+use nerf::gpu::tensor::TensorMemory;
 use nerf::gpu::{Gpu, adapter};
 use nerf::verify::check::{Forced, Setup, Subject, Tally, Workbench};
 
@@ -24,7 +24,7 @@ pub(crate) fn modest_subject() -> Result<Subject> {
     let gpu = Gpu::open_with(&adapter::choose(choice.as_deref())?, wgpu::Features::empty(), limits)?;
     let forced = Forced {
         accumulation: Some(Accumulation::Exchange),
-        memory: Some(Memory::Buffers),
+        memory: Some(TensorMemory::Buffers),
         product: Some(Product { rows: 2, shared_weights: false }),
     };
     Subject::new(&Arc::new(gpu), forced)

@@ -4,7 +4,7 @@
 use anyhow::Result;
 use nerf::config::Accumulation;
 use nerf::field::layer::Product;
-use nerf::gpu::tensor::Memory;
+use nerf::gpu::tensor::TensorMemory;
 use nerf::verify::check::networks::{SHAPES, Shape, networks};
 use nerf::verify::check::{
     Forced, activation, adam, exponential, fused, grid, harmonics, lens, loss, marching, occupancy, random,
@@ -176,7 +176,7 @@ fn every_product() -> Result<()> {
 /// Every check, with tensors in buffers whatever suits this adapter best.
 #[test]
 fn tensors_in_buffers() -> Result<()> {
-    let subject = subject_with(Forced { memory: Some(Memory::Buffers), ..Forced::default() })?;
+    let subject = subject_with(Forced { memory: Some(TensorMemory::Buffers), ..Forced::default() })?;
     passes(marching::marched_samples(&subject)?);
     passes([
         grid::features(&subject)?,

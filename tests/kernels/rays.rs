@@ -36,7 +36,7 @@ fn lenses_that_were_left_out_are_refused() -> Result<()> {
 #[test]
 fn rays_along_the_axes() -> Result<()> {
     let mut bench = workbench(Setup::tiny())?;
-    bench.workspace.allocate(&bench.gpu, &viewing::demands(&bench.plan))?;
+    bench.workspace.allocate(&bench.gpu, &viewing::buffers(&bench.plan))?;
     let stage = viewing::rays(&bench.gpu, &bench.plan, &bench.workspace)?;
     let near = bench.plan.config.march.near;
     for (origin, back, want) in [

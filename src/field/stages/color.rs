@@ -5,7 +5,7 @@ use crate::field::layout::COLOR_INPUTS;
 use crate::field::march::{SPARE_ROWS, Scanned, scan};
 use crate::field::{Link, Plan, Workspace, dispatch, viewing};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
@@ -23,16 +23,16 @@ pub enum Selection {
 }
 
 /// The kept samples and the colour network's activations.
-pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let rows = plan.capacity.kept + SPARE_ROWS;
-    let mut demands = vec![
+    let mut buffers = vec![
         plan.tensor("chosen", Element::Vec4, plan.capacity.samples),
-        plan.tensor("kept_rows", Element::Pair, rows),
+        plan.tensor("kept_rows", Element::Vec2u, rows),
         plan.tensor("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
         plan.tensor("color", Element::Vec4, rows),
     ];
-    demands.extend(plan.color_hidden(&COLOR_HIDDEN, rows));
-    demands
+    buffers.extend(plan.color_hidden(&COLOR_HIDDEN, rows));
+    buffers
 }
 
 /// Selects, packs and colours.

@@ -2,7 +2,7 @@
 
 use crate::field::{Capacity, Counters, Link, Plan, Step, Workspace, dispatch};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
@@ -11,15 +11,15 @@ use anyhow::Result;
 pub const SPARE_ROWS: usize = 1024;
 
 /// Rays, their spans and the samples.
-pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let Capacity { rays, samples, .. } = plan.capacity;
     vec![
-        Demand::uniform::<Step>("step"),
-        Demand::uniform_storage::<Counters>("counters", 1),
-        Demand::indirect("dispatch", dispatch::COUNT * 4),
-        Demand::storage::<u32>("ray_steps", rays * plan.step_words()),
-        Demand::storage::<[u32; 2]>("ray_spans", rays),
-        Demand::storage::<[u32; 2]>("kept_spans", rays),
+        BufferSpec::uniform::<Step>("step"),
+        BufferSpec::uniform_storage::<Counters>("counters", 1),
+        BufferSpec::indirect("dispatch", dispatch::COUNT * 4),
+        BufferSpec::storage::<u32>("ray_steps", rays * plan.step_words()),
+        BufferSpec::storage::<[u32; 2]>("ray_spans", rays),
+        BufferSpec::storage::<[u32; 2]>("kept_spans", rays),
         plan.tensor("ray_lines", Element::Vec4, 2 * rays),
         plan.tensor("samples", Element::Vec4, samples + SPARE_ROWS),
     ]

@@ -8,7 +8,7 @@ use crate::config::{
 use crate::field::layer::Product;
 use crate::field::{Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
-use crate::gpu::tensor::Memory;
+use crate::gpu::tensor::TensorMemory;
 use crate::verify::reference::Transmittance;
 use anyhow::Result;
 use glam::DVec3;
@@ -25,7 +25,7 @@ pub struct Setup {
     /// How matrix products are written; `None` as the plan chooses.
     pub product: Option<Product>,
     /// Where tensors live; `None` as the plan chooses.
-    pub memory: Option<Memory>,
+    pub memory: Option<TensorMemory>,
 }
 
 impl Setup {

@@ -5,7 +5,7 @@ use crate::config::Accumulation;
 use crate::field::layer::Product;
 use crate::field::{Capabilities, Plan, optimize::accumulation_name};
 use crate::gpu::Gpu;
-use crate::gpu::tensor::Memory;
+use crate::gpu::tensor::TensorMemory;
 use anyhow::{Result, ensure};
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ pub struct Forced {
     /// How the table's gradients are summed.
     pub accumulation: Option<Accumulation>,
     /// Where tensors live.
-    pub memory: Option<Memory>,
+    pub memory: Option<TensorMemory>,
     /// How matrix products are written.
     pub product: Option<Product>,
 }
@@ -39,7 +39,7 @@ impl Subject {
             Capabilities::of(gpu).check(accumulation, name)?;
         }
         ensure!(
-            forced.memory != Some(Memory::Textures) || gpu.has(crate::gpu::tensor::TEXTURE_FEATURES),
+            forced.memory != Some(TensorMemory::Textures) || gpu.has(crate::gpu::tensor::TEXTURE_FEATURES),
             "tensors in textures need textures that a kernel reads and writes, and the adapter '{name}' does not \
              have them; leave it out, or ask for buffers"
         );
@@ -76,8 +76,8 @@ impl Subject {
     pub fn describe(&self) -> Result<String> {
         let Plan { accumulation, memory, product, .. } = self.setup(Setup::tiny()).plan(&self.gpu)?;
         let memory = match memory {
-            Memory::Buffers => "tensors in buffers",
-            Memory::Textures => "tensors in textures",
+            TensorMemory::Buffers => "tensors in buffers",
+            TensorMemory::Textures => "tensors in textures",
         };
         let rows = match product {
             Product { shared_weights: true, rows } => format!("{rows} rows and shared weights"),

@@ -8,7 +8,7 @@ use crate::field::{
     dispatch, march, optimize, records,
 };
 use crate::gpu::Gpu;
-use crate::gpu::banks::{Banks, Capacity, rows_of};
+use crate::gpu::paged_array::{PageCapacity, PagedArray, rows_of};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::model::TrainingRay;
 use anyhow::{Context, Result, ensure};
@@ -31,8 +31,8 @@ pub struct Workbench {
     scan: Arc<Stage>,
 }
 
-/// Rows of a bank of photos: so few that some photos lie in two banks.
-const BANK_ROWS: usize = 3;
+/// Rows of a page of photos: so few that some photos lie in two pages.
+const PAGE_ROWS: usize = 3;
 
 /// A kept sample as `shaders/common/kept_load.wgsl` reads it.
 pub(super) type KeptStep = [[f32; 4]; 2];
@@ -241,18 +241,18 @@ impl Workbench {
         self.read("ray_results", rays)
     }
 
-    /// Puts these words of photos on the device, in banks of a few rows.
+    /// Puts these words of photos on the device, in pages of a few rows.
     ///
     /// # Errors
     /// When the adapter cannot hold them.
     pub fn add_photos(&mut self, words: &[u32]) -> Result<()> {
         let (capacity, rows) =
-            (Capacity::of(&self.gpu.device.limits(), self.plan.memory), rows_of(words.len()));
+            (PageCapacity::of(&self.gpu.device.limits(), self.plan.memory), rows_of(words.len()));
         // More where the adapter binds few of them.
-        let capacity = capacity.with_bank_rows(BANK_ROWS.max(rows.div_ceil(capacity.banks())));
-        let mut banks = Banks::new(&self.gpu, records::NAME, rows, capacity)?;
-        banks.write(&self.gpu, 0, words)?;
-        self.workspace.add_banks(banks);
+        let capacity = capacity.with_page_rows(PAGE_ROWS.max(rows.div_ceil(capacity.pages())));
+        let mut pages = PagedArray::new(&self.gpu, records::NAME, rows, capacity)?;
+        pages.write(&self.gpu, 0, words)?;
+        self.workspace.add_pages(pages);
         Ok(())
     }
 

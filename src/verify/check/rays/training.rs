@@ -5,7 +5,7 @@ use crate::camera::{Camera, Lens};
 use crate::config::Background;
 use crate::field::records::Units;
 use crate::field::{self, RayTarget, SceneFeatures, dimension, rays};
-use crate::gpu::banks::ROW;
+use crate::gpu::paged_array::ROW;
 use crate::photo::Photo;
 use crate::photo::{Image, Pixels};
 use crate::verify::check::draw::{Random, SEED, STEP, uniform};
@@ -14,7 +14,7 @@ use crate::verify::reference::random::random_u32;
 use anyhow::Result;
 use glam::DVec2;
 
-/// Photos smaller than a row of the banks, and one that lies in several banks.
+/// Photos smaller than a row of the pages, and one that lies in several pages.
 const SIZES: [(u32, u32); 5] = [(5, 3), (4, 4), (1, 1), (70, 131), (2, 31)];
 /// A rig that mixes lenses.
 const LENSES: [Lens; 5] = [

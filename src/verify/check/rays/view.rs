@@ -127,7 +127,7 @@ impl Bench {
         setup.bounds = super::bounds();
         setup.config.batch.rays = rays;
         let mut bench = subject.workbench(setup)?;
-        bench.workspace.allocate(&bench.gpu, &viewing::demands(&bench.plan))?;
+        bench.workspace.allocate(&bench.gpu, &viewing::buffers(&bench.plan))?;
         let stage = viewing::rays(&bench.gpu, &bench.plan, &bench.workspace)?;
         Ok(Self { bench, stage })
     }

@@ -2,13 +2,13 @@
 
 use super::Gpu;
 use super::buffer::Buffer;
-use super::tensor::{Element, Memory, Tensor};
+use super::tensor::{Element, Tensor, TensorMemory};
 use anyhow::Result;
 use wgpu::BufferUsages;
 
 /// A buffer or a tensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Demand {
+pub struct BufferSpec {
     /// The name of the WGSL variable it stands for.
     pub name: &'static str,
     kind: Kind,
@@ -20,7 +20,7 @@ pub struct Demand {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Buffer(BufferUsages),
-    Tensor(Element, Memory),
+    Tensor(Element, TensorMemory),
 }
 
 /// Something on a device.
@@ -32,7 +32,7 @@ pub enum Allocation {
     Tensor(Tensor),
 }
 
-impl Demand {
+impl BufferSpec {
     /// A storage buffer of `count` elements of `T`.
     #[must_use]
     pub fn storage<T>(name: &'static str, count: usize) -> Self {
@@ -63,7 +63,7 @@ impl Demand {
 
     /// A tensor.
     #[must_use]
-    pub fn tensor(name: &'static str, element: Element, count: usize, memory: Memory) -> Self {
+    pub fn tensor(name: &'static str, element: Element, count: usize, memory: TensorMemory) -> Self {
         Self { name, kind: Kind::Tensor(element, memory), size: element.bytes(), count }
     }
 
@@ -79,7 +79,7 @@ impl Demand {
     /// When it cannot; the message tells both sizes.
     pub fn check(&self, gpu: &Gpu) -> Result<()> {
         match self.kind {
-            Kind::Tensor(_, Memory::Textures) => gpu.check_texture(self.name, self.count),
+            Kind::Tensor(_, TensorMemory::Textures) => gpu.check_texture(self.name, self.count),
             _ => gpu.check_buffer(self.name, self.bytes()),
         }
     }

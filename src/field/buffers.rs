@@ -6,7 +6,7 @@ use super::{
     rays, viewing,
 };
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::tensor::Element;
 use anyhow::{Result, anyhow};
 
@@ -17,59 +17,57 @@ impl Plan {
     /// When it cannot: says what it lacks, and what to change.
     pub fn check(&self, gpu: &Gpu) -> Result<()> {
         Capabilities::of(gpu).check(self.accumulation, &gpu.info.name)?;
-        let demands = self
-            .training_demands(self.cell_count())
+        let buffers = self
+            .training_buffers(self.cell_count())
             .into_iter()
-            .chain(self.for_views(&self.features.lenses).viewing_demands());
-        for demand in demands {
-            demand
-                .check(gpu)
-                .map_err(|error| anyhow!("{error}; use a smaller {}", setting_of(demand.name)))?;
+            .chain(self.for_views(&self.features.lenses).viewing_buffers());
+        for spec in buffers {
+            spec.check(gpu).map_err(|error| anyhow!("{error}; use a smaller {}", setting_of(spec.name)))?;
         }
         Ok(())
     }
 
     /// Everything but the photos that a training needs, which visits `visible` cells of its occupancy grid.
     #[must_use]
-    pub fn training_demands(&self, visible: usize) -> Vec<Demand> {
-        [self.field_demands(true), self.step_demands(visible)].concat()
+    pub fn training_buffers(&self, visible: usize) -> Vec<BufferSpec> {
+        [self.field_buffers(true), self.step_buffers(visible)].concat()
     }
 
     /// What the steps of a training need besides the field and the photos.
-    fn step_demands(&self, visible: usize) -> Vec<Demand> {
+    fn step_buffers(&self, visible: usize) -> Vec<BufferSpec> {
         [
-            rays::demands(self),
-            march::demands(self),
-            density::demands(self),
-            color::demands(self),
-            composite::demands(self),
-            backward::demands(self),
-            optimize::demands(self),
-            occupancy::demands(visible),
+            rays::buffers(self),
+            march::buffers(self),
+            density::buffers(self),
+            color::buffers(self),
+            composite::buffers(self),
+            backward::buffers(self),
+            optimize::buffers(self),
+            occupancy::buffers(visible),
         ]
         .concat()
     }
 
     /// The field: what describes its levels, and all of its arrays or those that rendering reads.
-    pub(super) fn field_demands(&self, is_whole: bool) -> Vec<Demand> {
-        let levels = Demand::uniform_storage::<Level>("levels", self.layout.levels.len());
+    pub(super) fn field_buffers(&self, is_whole: bool) -> Vec<BufferSpec> {
+        let levels = BufferSpec::uniform_storage::<Level>("levels", self.layout.levels.len());
         let arrays = self.arrays().filter(|array| array.rendered || is_whole);
-        [levels].into_iter().chain(arrays.map(|array| array.demand(self))).collect()
+        [levels].into_iter().chain(arrays.map(|array| array.spec(self))).collect()
     }
 
     /// What rendering needs besides the parameters, as the plan of a renderer.
     #[must_use]
-    pub fn viewing_demands(&self) -> Vec<Demand> {
-        [march::demands(self), density::demands(self), color::demands(self), viewing::demands(self)].concat()
+    pub fn viewing_buffers(&self) -> Vec<BufferSpec> {
+        [march::buffers(self), density::buffers(self), color::buffers(self), viewing::buffers(self)].concat()
     }
 
     /// A tensor in the plan's memory.
-    pub(super) fn tensor(&self, name: &'static str, element: Element, count: usize) -> Demand {
-        Demand::tensor(name, element, count, self.memory)
+    pub(super) fn tensor(&self, name: &'static str, element: Element, count: usize) -> BufferSpec {
+        BufferSpec::tensor(name, element, count, self.memory)
     }
 
     /// One tensor of `rows` rows per hidden layer of the colour network.
-    pub(super) fn color_hidden(&self, names: &'static [&'static str], rows: usize) -> Vec<Demand> {
+    pub(super) fn color_hidden(&self, names: &'static [&'static str], rows: usize) -> Vec<BufferSpec> {
         let count = rows * self.config.network.width / 4;
         let layers = self.config.network.color_layers;
         names.iter().take(layers).map(|name| self.tensor(name, Element::Vec4, count)).collect()
@@ -100,7 +98,7 @@ impl Workspace {
         let (gpu, plan) = (field.gpu(), field.plan());
         let mut workspace = Self::default();
         workspace.share(&field.arrays);
-        workspace.allocate(gpu, &plan.step_demands(visible.len()))?;
+        workspace.allocate(gpu, &plan.step_buffers(visible.len()))?;
         workspace.write(gpu, "visible_cells", visible);
         Ok(workspace)
     }

@@ -1,18 +1,18 @@
-//! An array of words that may be larger than one binding: rows of [`ROW`] words in as many banks as it takes.
+//! An array of words that may be larger than one binding: rows of [`ROW`] words in as many pages as it takes.
 //!
-//! A bank is a storage buffer or, where that is faster, an array of textures. Kernels call `name_word(first_row,
-//! word)` of the part that [`Banks::part`] generates, and do not know where a bank ends.
+//! A page is a storage buffer or, where that is faster, an array of textures. Kernels call `name_word(first_row,
+//! word)` of the part that [`PagedArray::part`] generates, and do not know where a page ends.
 
 use super::Gpu;
 use super::buffer::Buffer;
 use super::kernel::Resource;
-use super::tensor::Memory;
+use super::tensor::TensorMemory;
 use anyhow::{Result, ensure};
 use std::fmt::Write;
 
 /// Words per row.
 pub const ROW: usize = 4096;
-/// Rows of one layer of a texture bank.
+/// Rows of one layer of a texture page.
 const LAYER_ROWS: usize = 4096;
 /// Bytes that software drivers allow for all layers of a texture stay below this.
 const TEXTURE_BYTES: u64 = 1 << 30;
@@ -21,92 +21,92 @@ const ROW_BYTES: u64 = (ROW * size_of::<u32>()) as u64;
 const OTHER_BINDINGS: u32 = 3;
 /// Bytes written before the device is waited for, which then lets go of its staging memory.
 const STAGED_BYTES: u64 = 64 << 20;
-/// Names of the banks.
+/// Names of the pages.
 const NAMES: [&str; 32] = [
-    "bank_0", "bank_1", "bank_2", "bank_3", "bank_4", "bank_5", "bank_6", "bank_7", "bank_8", "bank_9",
-    "bank_10", "bank_11", "bank_12", "bank_13", "bank_14", "bank_15", "bank_16", "bank_17", "bank_18",
-    "bank_19", "bank_20", "bank_21", "bank_22", "bank_23", "bank_24", "bank_25", "bank_26", "bank_27",
-    "bank_28", "bank_29", "bank_30", "bank_31",
+    "page_0", "page_1", "page_2", "page_3", "page_4", "page_5", "page_6", "page_7", "page_8", "page_9",
+    "page_10", "page_11", "page_12", "page_13", "page_14", "page_15", "page_16", "page_17", "page_18",
+    "page_19", "page_20", "page_21", "page_22", "page_23", "page_24", "page_25", "page_26", "page_27",
+    "page_28", "page_29", "page_30", "page_31",
 ];
 
 /// How much an adapter holds, and how it is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Capacity {
-    memory: Memory,
-    /// Rows of one bank.
-    bank_rows: usize,
-    /// Most banks.
-    banks: usize,
+pub struct PageCapacity {
+    memory: TensorMemory,
+    /// Rows of one page.
+    page_rows: usize,
+    /// Most pages.
+    pages: usize,
 }
 
-impl Capacity {
+impl PageCapacity {
     /// What `limits` allow.
     #[must_use]
-    pub fn of(limits: &wgpu::Limits, memory: Memory) -> Self {
-        let (bank_rows, bindings) = match memory {
-            Memory::Buffers => {
+    pub fn of(limits: &wgpu::Limits, memory: TensorMemory) -> Self {
+        let (page_rows, bindings) = match memory {
+            TensorMemory::Buffers => {
                 let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
                 (bytes / ROW_BYTES, limits.max_storage_buffers_per_shader_stage)
             }
-            Memory::Textures => {
+            TensorMemory::Textures => {
                 let layers = u64::from(limits.max_texture_array_layers) * LAYER_ROWS as u64;
                 (layers.min(TEXTURE_BYTES / ROW_BYTES), limits.max_sampled_textures_per_shader_stage)
             }
         };
-        let banks = bindings.saturating_sub(OTHER_BINDINGS).max(1) as usize;
-        Self { memory, bank_rows: bank_rows.max(1) as usize, banks: banks.min(NAMES.len()) }
+        let pages = bindings.saturating_sub(OTHER_BINDINGS).max(1) as usize;
+        Self { memory, page_rows: page_rows.max(1) as usize, pages: pages.min(NAMES.len()) }
     }
 
-    /// Most banks.
+    /// Most pages.
     #[must_use]
-    pub fn banks(&self) -> usize {
-        self.banks
+    pub fn pages(&self) -> usize {
+        self.pages
     }
 
-    /// Most bytes of all banks together.
+    /// Most bytes of all pages together.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        (self.bank_rows * self.banks) as u64 * ROW_BYTES
+        (self.page_rows * self.pages) as u64 * ROW_BYTES
     }
 
-    /// The part that reads an array of so many banks: `name_word(first_row, word)`.
+    /// The part that reads an array of so many pages: `name_word(first_row, word)`.
     #[must_use]
-    pub fn part(&self, name: &str, banks: usize) -> String {
-        let Self { memory, bank_rows, .. } = self;
+    pub fn part(&self, name: &str, pages: usize) -> String {
+        let Self { memory, page_rows, .. } = self;
         let mut text = String::new();
         let mut cases = String::new();
-        for (index, bank) in NAMES.iter().take(banks).enumerate() {
+        for (index, page) in NAMES.iter().take(pages).enumerate() {
             let (declaration, load) = match memory {
-                Memory::Buffers => (
-                    format!("var<storage, read> {bank}: array<u32>;"),
-                    format!("{bank}[row * {ROW}u + column]"),
+                TensorMemory::Buffers => (
+                    format!("var<storage, read> {page}: array<u32>;"),
+                    format!("{page}[row * {ROW}u + column]"),
                 ),
-                Memory::Textures => (
-                    format!("var {bank}: texture_2d_array<u32>;"),
+                TensorMemory::Textures => (
+                    format!("var {page}: texture_2d_array<u32>;"),
                     format!(
-                        "textureLoad({bank}, vec2(column, row % {LAYER_ROWS}u), row / {LAYER_ROWS}u, 0).x"
+                        "textureLoad({page}, vec2(column, row % {LAYER_ROWS}u), row / {LAYER_ROWS}u, 0).x"
                     ),
                 ),
             };
             // Writing to a String cannot fail.
             let _ = writeln!(text, "{declaration}");
-            let label = if index + 1 == banks { "default".into() } else { format!("case {index}u") };
+            let label = if index + 1 == pages { "default".into() } else { format!("case {index}u") };
             let _ = writeln!(cases, "        {label}: {{ return {load}; }}");
         }
         let _ = writeln!(
             text,
             "fn {name}_word(first_row: u32, word: u32) -> u32 {{\n    \
                  let column = word % {ROW}u;\n    \
-                 let row = (first_row + word / {ROW}u) % {bank_rows}u;\n    \
-                 switch (first_row + word / {ROW}u) / {bank_rows}u {{\n{cases}    }}\n}}"
+                 let row = (first_row + word / {ROW}u) % {page_rows}u;\n    \
+                 switch (first_row + word / {ROW}u) / {page_rows}u {{\n{cases}    }}\n}}"
         );
         text
     }
 
-    /// The same with banks of at most `rows` rows, so that small arrays take several.
+    /// The same with pages of at most `rows` rows, so that small arrays take several.
     #[must_use]
-    pub fn with_bank_rows(self, rows: usize) -> Self {
-        Self { bank_rows: self.bank_rows.min(rows), ..self }
+    pub fn with_page_rows(self, rows: usize) -> Self {
+        Self { page_rows: self.page_rows.min(rows), ..self }
     }
 }
 
@@ -124,43 +124,43 @@ pub fn bytes_of(rows: usize) -> u64 {
 
 /// The array.
 #[derive(Clone, Debug)]
-pub struct Banks {
+pub struct PagedArray {
     name: &'static str,
-    capacity: Capacity,
-    banks: Vec<Bank>,
+    capacity: PageCapacity,
+    pages: Vec<Page>,
     /// Bytes written since the device was waited for.
     staged: u64,
 }
 
 #[derive(Clone, Debug)]
-enum Bank {
+enum Page {
     Buffer(Buffer),
     Texture(wgpu::Texture, wgpu::TextureView),
 }
 
-impl Banks {
+impl PagedArray {
     /// A zeroed array of `rows` rows.
     ///
     /// # Errors
     /// When the adapter cannot bind or does not have as much; the message tells both sizes.
-    pub fn new(gpu: &Gpu, name: &'static str, rows: usize, capacity: Capacity) -> Result<Self> {
-        let count = rows.div_ceil(capacity.bank_rows).max(1);
+    pub fn new(gpu: &Gpu, name: &'static str, rows: usize, capacity: PageCapacity) -> Result<Self> {
+        let count = rows.div_ceil(capacity.page_rows).max(1);
         ensure!(
-            count <= capacity.banks,
+            count <= capacity.pages,
             "the {name} need {} bytes on the device, and the adapter '{}' binds at most {} for them",
             bytes_of(rows),
             gpu.info.name,
             capacity.bytes()
         );
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let bank = |index: usize| {
-            let rows = rows.saturating_sub(index * capacity.bank_rows).clamp(1, capacity.bank_rows);
+        let page = |index: usize| {
+            let rows = rows.saturating_sub(index * capacity.page_rows).clamp(1, capacity.page_rows);
             match capacity.memory {
-                Memory::Buffers => Ok(Bank::Buffer(gpu.storage::<u32>(NAMES[index], rows * ROW)?)),
-                Memory::Textures => Ok(texture(gpu, NAMES[index], rows)),
+                TensorMemory::Buffers => Ok(Page::Buffer(gpu.storage::<u32>(NAMES[index], rows * ROW)?)),
+                TensorMemory::Textures => Ok(texture(gpu, NAMES[index], rows)),
             }
         };
-        let banks: Result<Vec<_>> = (0..count).map(bank).collect();
+        let pages: Result<Vec<_>> = (0..count).map(page).collect();
         let failure = pollster::block_on(scope.pop());
         ensure!(
             failure.is_none(),
@@ -168,19 +168,19 @@ impl Banks {
             bytes_of(rows),
             gpu.info.name
         );
-        Ok(Self { name, capacity, banks: banks?, staged: 0 })
+        Ok(Self { name, capacity, pages: pages?, staged: 0 })
     }
 
     /// Bytes on the device.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let bytes = |bank: &Bank| match bank {
-            Bank::Buffer(buffer) => buffer.raw.size(),
-            Bank::Texture(texture, _) => {
+        let bytes = |page: &Page| match page {
+            Page::Buffer(buffer) => buffer.raw.size(),
+            Page::Texture(texture, _) => {
                 bytes_of(texture.height() as usize) * u64::from(texture.depth_or_array_layers())
             }
         };
-        self.banks.iter().map(bytes).sum()
+        self.pages.iter().map(bytes).sum()
     }
 
     /// Writes `words` from the start of row `first` on, and now and then waits for the device, so that not all of
@@ -192,12 +192,12 @@ impl Banks {
         let mut row = first;
         let mut rest = words;
         while !rest.is_empty() {
-            let within = row % self.capacity.bank_rows;
-            let room = (self.capacity.bank_rows - within) * ROW;
+            let within = row % self.capacity.page_rows;
+            let room = (self.capacity.page_rows - within) * ROW;
             let (now, later) = rest.split_at(rest.len().min(room));
-            match &self.banks[row / self.capacity.bank_rows] {
-                Bank::Buffer(buffer) => gpu.write(buffer, within * ROW, now),
-                Bank::Texture(texture, _) => write_texture(gpu, texture, within, now),
+            match &self.pages[row / self.capacity.page_rows] {
+                Page::Buffer(buffer) => gpu.write(buffer, within * ROW, now),
+                Page::Texture(texture, _) => write_texture(gpu, texture, within, now),
             }
             row += rows_of(now.len());
             rest = later;
@@ -214,17 +214,17 @@ impl Banks {
     /// The part that reads it: `name_word(first_row, word)`.
     #[must_use]
     pub fn part(&self) -> String {
-        self.capacity.part(self.name, self.banks.len())
+        self.capacity.part(self.name, self.pages.len())
     }
 
-    /// The banks under the names that the part knows.
+    /// The pages under the names that the part knows.
     #[must_use]
     pub fn resources(&self) -> Vec<Resource<'_>> {
-        self.banks.iter().zip(NAMES).map(|(bank, name)| bank.named(name)).collect()
+        self.pages.iter().zip(NAMES).map(|(page, name)| page.named(name)).collect()
     }
 }
 
-impl Bank {
+impl Page {
     fn named(&self, name: &'static str) -> Resource<'_> {
         match self {
             Self::Buffer(buffer) => buffer.named(name),
@@ -233,7 +233,7 @@ impl Bank {
     }
 }
 
-fn texture(gpu: &Gpu, name: &'static str, rows: usize) -> Bank {
+fn texture(gpu: &Gpu, name: &'static str, rows: usize) -> Page {
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some(name),
         size: wgpu::Extent3d {
@@ -252,7 +252,7 @@ fn texture(gpu: &Gpu, name: &'static str, rows: usize) -> Bank {
         dimension: Some(wgpu::TextureViewDimension::D2Array),
         ..Default::default()
     });
-    Bank::Texture(texture, view)
+    Page::Texture(texture, view)
 }
 
 /// Writes whole rows, layer by layer; the last row is filled up with zeros.
