@@ -151,7 +151,7 @@ impl Dataset {
     #[must_use]
     pub fn focus(&self) -> Option<DVec3> {
         let cameras = self.distinct_images().into_iter().map(|index| &self.frames[index].camera);
-        let axes: Vec<_> = cameras.map(focus::Axis::of).collect();
+        let axes: Vec<_> = cameras.map(focus::OpticalAxis::of).collect();
         let found = (!axes.is_empty()).then(|| focus::find(&axes))?;
         (found.kind == focus::FocusKind::Crossing).then_some(found.point)
     }

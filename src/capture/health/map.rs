@@ -44,7 +44,7 @@ pub fn draw(dataset: &Dataset, survey: &Survey, marked: &HashSet<usize>) -> Draw
     let map = Map::new(dataset, survey, marked);
     let mut drawing = Drawing::new(SIZE, GROUND);
     let width = 0.5 * (SIZE.x - 3.0 * MARGIN);
-    let projections = Projection::above_and_beside(survey.gaze.up);
+    let projections = Projection::above_and_beside(survey.directions.up);
     let corners = [dvec2(MARGIN, HEADER), dvec2(2.0 * MARGIN + width, HEADER)];
     let size = dvec2(width, SIZE.y - HEADER - FOOTER);
     let range = map.range(&projections, size);
@@ -103,7 +103,7 @@ impl<'a> Map<'a> {
     /// What is to be seen: the inner cube, the focus, and the cameras but for those far away that are marked.
     fn extent(&self) -> (DVec3, DVec3) {
         let bounds = &self.dataset.bounds;
-        let mut low = self.survey.gaze.focus;
+        let mut low = self.survey.directions.focus;
         let mut high = low;
         let mut include = |point: DVec3| (low, high) = (low.min(point), high.max(point));
         let positions = |is_marked: bool| {
@@ -185,7 +185,7 @@ impl<'a> Map<'a> {
         let camera = self.camera(frame);
         let size = dvec2(f64::from(camera.width), f64::from(camera.height));
         let Some(ray) = camera.ray(0.5 * size) else { return };
-        let ahead = (self.survey.gaze.focus - ray.origin).dot(ray.direction);
+        let ahead = (self.survey.directions.focus - ray.origin).dot(ray.direction);
         let along = if ahead > 0.0 { ahead } else { 4.0 * self.frustum };
         let is_marked = self.marked.contains(&frame);
         let color = self.color(frame).faint(if is_marked { 0.9 } else { weight });
@@ -194,7 +194,7 @@ impl<'a> Map<'a> {
     }
 
     fn draw_focus(&self, panel: &Panel, drawing: &mut Drawing) {
-        let at = panel.place(self.survey.gaze.focus);
+        let at = panel.place(self.survey.directions.focus);
         let arm = 8.0;
         for [dx, dy] in [[arm, 0.0], [0.0, arm]] {
             let arm = dvec2(dx, dy);
@@ -246,7 +246,7 @@ impl<'a> Map<'a> {
             let position = self.camera(frame).position();
             let mut name = self.dataset.frames[frame].name.rsplit('/').next().unwrap_or_default().to_owned();
             if !panel.shows(position) {
-                name += &format!(" ({} away)", length(position.distance(self.survey.gaze.focus)));
+                name += &format!(" ({} away)", length(position.distance(self.survey.directions.focus)));
             }
             let camera = panel.rim(position);
             let is_right = camera.x > panel.corner.x + 0.6 * panel.size.x;
@@ -306,12 +306,12 @@ impl<'a> Map<'a> {
     }
 
     fn footnote(&self) -> String {
-        let gaze = &self.survey.gaze;
-        let focus = if gaze.meets { "the axes meet" } else { "the axes do not meet; the focus is" };
+        let directions = &self.survey.directions;
+        let focus = if directions.meets { "the axes meet" } else { "the axes do not meet; the focus is" };
         format!(
             "{focus} at {}, {} from the cameras; the box is {} wide",
-            point(gaze.focus, gaze.distance.median),
-            gaze.distance.tell(length),
+            point(directions.focus, directions.distance.median),
+            directions.distance.tell(length),
             length(2.0 * self.dataset.bounds.outer_half())
         )
     }

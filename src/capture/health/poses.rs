@@ -1,6 +1,6 @@
 //! Single poses that look wrong: far from the others, turned away, or given twice.
 
-use super::gaze::Gaze;
+use super::view_directions::ViewDirections;
 use super::{Finding, Scene, Spread};
 use crate::camera::LensKind;
 use crate::capture::dataset::Dataset;
@@ -28,7 +28,7 @@ const TURNED_AWAY: f64 = 2.0;
 const SAME: f64 = 1e-6;
 
 /// Cameras that are far from all others, or look elsewhere.
-pub(super) fn outliers(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
+pub(super) fn outliers(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Finding> {
     if scene.count() < LEAST_VIEWS {
         return Vec::new();
     }
@@ -66,15 +66,15 @@ pub(super) fn outliers(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
         );
         findings.push(Finding::warning(message).about(frames));
     }
-    let away: Vec<usize> = away(scene, gaze).into_iter().filter(|view| !far.contains(view)).collect();
+    let away: Vec<usize> = away(scene, directions).into_iter().filter(|view| !far.contains(view)).collect();
     if is_few(&away, scene) {
         let frames = frames(scene, &away);
         let names = scene.names(&frames);
         let message = format!(
             "{} turned away from what {:.0} % of the cameras look at, by {:.0}° in {names}; check or drop the pose",
             are(&away),
-            100.0 * gaze.seeing,
-            gaze.off_rad[away[0]].to_degrees(),
+            100.0 * directions.seeing,
+            directions.off_rad[away[0]].to_degrees(),
         );
         findings.push(Finding::warning(message).about(frames));
     }
@@ -125,18 +125,18 @@ fn jumps(positions: &[DVec3]) -> Vec<usize> {
     (1..positions.len() - 1).filter(is_jump).collect()
 }
 
-fn away(scene: &Scene<'_>, gaze: &Gaze) -> Vec<usize> {
-    if !gaze.meets || gaze.seeing < NEARLY_ALL {
+fn away(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<usize> {
+    if !directions.meets || directions.seeing < NEARLY_ALL {
         return Vec::new();
     }
     let cameras: Vec<_> = scene.cameras().collect();
     let is_away = |&view: &usize| {
         let axis = &scene.axes[view];
-        let distance = axis.origin.distance(gaze.focus).max(f64::MIN_POSITIVE);
+        let distance = axis.origin.distance(directions.focus).max(f64::MIN_POSITIVE);
         let half_view = (axis.half_width_at(distance) / distance).atan();
         // Lenses that see all around may point anywhere.
         let points = !matches!(cameras[view].lens.kind(), LensKind::Fisheye | LensKind::Equirectangular);
-        points && gaze.off_rad[view] > TURNED_AWAY * half_view
+        points && directions.off_rad[view] > TURNED_AWAY * half_view
     };
     (0..scene.count()).filter(is_away).collect()
 }

@@ -2,7 +2,7 @@
 
 use super::{Report, problems};
 use nerf::capture::dataset::Frame;
-use nerf::capture::health::{Arrangement, Gaze, Severity, Spread};
+use nerf::capture::health::{Arrangement, Severity, Spread, ViewDirections};
 use nerf::photo::BitDepth;
 use nerf::run::Estimate;
 use nerf::support::format::{bytes, count, length, percent, point, short};
@@ -21,7 +21,7 @@ impl Report<'_> {
             ("cameras", self.about_cameras()),
             ("box", self.about_box()),
             ("coverage", self.about_coverage()),
-            ("gaze", about_gaze(&self.survey.gaze, self.survey.views.len())),
+            ("views", about_view_directions(&self.survey.directions, self.survey.views.len())),
             ("photos", self.about_photos()),
             ("memory", self.memory.as_ref().map_or_else(Vec::new, about_memory)),
             ("left out", self.about_left_out()),
@@ -225,26 +225,27 @@ fn center([x, y]: &[Spread; 2]) -> String {
     }
 }
 
-fn about_gaze(gaze: &Gaze, views: usize) -> Vec<String> {
-    let focus = point(gaze.focus, gaze.distance.median);
+fn about_view_directions(directions: &ViewDirections, views: usize) -> Vec<String> {
+    let focus = point(directions.focus, directions.distance.median);
     if views == 1 {
         return vec![format!(
             "a single camera; taken for what it looks at: {focus}, {} away",
-            length(gaze.distance.median)
+            length(directions.distance.median)
         )];
     }
-    let focus = match gaze.meets {
+    let focus = match directions.meets {
         true => format!("the optical axes meet near {focus}"),
         false => format!("the optical axes do not meet; taken for the focus: {focus}"),
     };
-    let mut lines = vec![focus, format!("distance of the cameras from it {}", gaze.distance.tell(length))];
+    let mut lines =
+        vec![focus, format!("distance of the cameras from it {}", directions.distance.tell(length))];
     lines.push(format!(
         "{} of the cameras see it; their axes pass it at {} of the distance, at worst {}",
-        percent(gaze.seeing),
-        percent(gaze.miss.median),
-        percent(gaze.miss.max)
+        percent(directions.seeing),
+        percent(directions.miss.median),
+        percent(directions.miss.max)
     ));
-    lines.push(match gaze.arrangement {
+    lines.push(match directions.arrangement {
         Arrangement::Single => "a single camera".to_owned(),
         Arrangement::Parallel { within_degrees } => {
             format!("all look the same way, within {within_degrees:.1}°")

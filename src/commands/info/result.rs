@@ -40,7 +40,7 @@ impl Report<'_> {
                 "inner_cube": self.survey.coverage.inner(),
                 "worst": self.names(&self.survey.coverage.worst),
             },
-            "gaze": self.gaze(),
+            "gaze": self.view_directions(),
             "photos": self.photos(),
             "memory": self.memory_json(),
             "left_out": self.memory.as_ref().map(|estimate| &estimate.left_out),
@@ -80,9 +80,9 @@ impl Report<'_> {
         })
     }
 
-    fn gaze(&self) -> Value {
-        let gaze = &self.survey.gaze;
-        let arrangement = match gaze.arrangement {
+    fn view_directions(&self) -> Value {
+        let directions = &self.survey.directions;
+        let arrangement = match directions.arrangement {
             Arrangement::Single => json!({ "kind": "single" }),
             Arrangement::Parallel { within_degrees } => {
                 json!({ "kind": "parallel", "within_degrees": within_degrees })
@@ -96,12 +96,12 @@ impl Report<'_> {
             Arrangement::Scattered => json!({ "kind": "scattered" }),
         };
         json!({
-            "focus": gaze.focus.to_array(),
-            "axes_meet": gaze.meets,
-            "distance": gaze.distance,
-            "relative_miss": gaze.miss,
-            "seeing": gaze.seeing,
-            "up": gaze.up.to_array(),
+            "focus": directions.focus.to_array(),
+            "axes_meet": directions.meets,
+            "distance": directions.distance,
+            "relative_miss": directions.miss,
+            "seeing": directions.seeing,
+            "up": directions.up.to_array(),
             "arrangement": arrangement,
         })
     }

@@ -1,7 +1,7 @@
 //! The parameters of a workbench's field: what lies where on the device, and the same for the reference.
 
 use super::Workbench;
-use super::draw::Random;
+use super::inputs::Random;
 use crate::config::{self, Accumulation};
 use crate::field::layout::{FEATURES, Layer};
 use crate::verify::reference::grid::GridLevel;

@@ -7,7 +7,7 @@ pub use training::{drawn, training_rays};
 pub use view::{sharp_rays, view_rays};
 
 use super::Workbench;
-use super::draw::Random;
+use super::inputs::Random;
 use crate::camera::Bounds;
 use crate::camera::{Camera, Lens, LensKind};
 use crate::field::{self, Progress};

@@ -1,6 +1,6 @@
 //! What a workbench is built from.
 
-use super::draw::SEED;
+use super::inputs::SEED;
 use crate::camera::Bounds;
 use crate::config::{
     self, Accumulation, Batch, Config, Grid, March, Network, Occupancy, Optimizer, Selection,

@@ -1,8 +1,8 @@
 //! A whole view through the renderer.
 
-use super::draw::Random;
+use super::inputs::Random;
 use super::marching::reference;
-use super::{Setup, Subject, Tally, Workbench};
+use super::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::camera::Bounds;
 use crate::camera::{Camera, Lens, LensKind};
 use crate::field::capacity::{LEAST_WEIGHT, Rounds};
@@ -24,20 +24,21 @@ const SIZE: (u32, u32) = (11, 9);
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn rendered_views(subject: &Subject) -> Result<Vec<Tally>> {
-    let mut shared = Tally::new(
+pub fn rendered_views(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
+    let mut shared = CheckResult::new(
         "rendered views: shared colours",
         2e-3,
         "a colour stands for that of samples whose weights sum to 0.001",
     );
-    let mut tally = Tally::new(
+    let mut result = CheckResult::new(
         "rendered views",
         2e-5,
         "sums of the networks round; a ray ends at a transmittance of 1e-6",
     );
     let lens = Lens::OpenCv { k: [-0.1, 0.02, 0.0, 0.0], p: [1e-3, -1e-3] };
     let fisheye = Lens::Fisheye { k: [-0.05, 0.01, 0.0, 0.0] };
-    let mut rounds = Tally::new("rendered views: rounds", 1e-6, "the same sums, however they are parted");
+    let mut rounds =
+        CheckResult::new("rendered views: rounds", 1e-6, "the same sums, however they are parted");
     let scenes = [
         (1, false, Lens::Pinhole, Transmittance::Exclusive),
         (3, true, lens, Transmittance::Inclusive),
@@ -50,18 +51,18 @@ pub fn rendered_views(subject: &Subject) -> Result<Vec<Tally>> {
         setup.config.selection.stop_transmittance = STOP;
         (setup.bounds.center, setup.bounds.half) = (DVec3::new(1.0, 2.0, 3.0), 0.75);
         let bounds = setup.bounds.clone();
-        let mut bench = subject.workbench(setup)?;
+        let mut bench = adapter.workbench(setup)?;
         bench.randomise(&mut Random::new(90), 2.0, 1.5)?;
         bench.write("occupancy_bits", &vec![u32::MAX; bench.plan.cell_count() / 32]);
         let scene = Scene { camera: camera(&bounds, lens), bounds };
         scene.compare(&mut shared, &bench)?;
         bench.plan.rounds.color_weight = LEAST_WEIGHT;
-        let view = scene.compare(&mut tally, &bench)?;
+        let view = scene.compare(&mut result, &bench)?;
         if number < 2 {
             scene.compare_rounds(&mut rounds, &mut bench, &view)?;
         }
     }
-    Ok(vec![tally, shared, rounds])
+    Ok(vec![result, shared, rounds])
 }
 
 /// What is seen, and from where.
@@ -104,19 +105,19 @@ impl Scene {
     }
 
     /// Compares with the reference.
-    fn compare(&self, tally: &mut Tally, bench: &Workbench) -> Result<View> {
+    fn compare(&self, result: &mut CheckResult, bench: &Workbench) -> Result<View> {
         let (view, case) = (self.render(bench)?, self.name());
         let (colors, depths) = expected(bench, &self.bounds, &self.camera)?;
-        tally.holds((view.width, view.height) == SIZE, || format!("{case}: size"));
+        result.holds((view.width, view.height) == SIZE, || format!("{case}: size"));
         let size = |i: usize| 1.0 + colors[i].abs();
-        tally.each(&format!("{case}, colour"), view.color.as_flattened(), &colors, size);
-        tally.each(&format!("{case}, depth"), &view.depth, &depths, |i| 1.0 + depths[i]);
-        tally.holds(depths.iter().any(|&z| z > 0.0), || format!("{case}: all is transparent"));
+        result.each(&format!("{case}, colour"), view.color.as_flattened(), &colors, size);
+        result.each(&format!("{case}, depth"), &view.depth, &depths, |i| 1.0 + depths[i]);
+        result.holds(depths.iter().any(|&z| z > 0.0), || format!("{case}: all is transparent"));
         Ok(view)
     }
 
     /// Rounds of one sample, of three, and of all that a ray has, in bands that end in the middle of a row.
-    fn compare_rounds(&self, tally: &mut Tally, bench: &mut Workbench, want: &View) -> Result<()> {
+    fn compare_rounds(&self, result: &mut CheckResult, bench: &mut Workbench, want: &View) -> Result<()> {
         let ordinary = bench.plan.rounds;
         let colors: Vec<f64> = want.color.as_flattened().iter().map(|&x| x.into()).collect();
         let depths: Vec<f64> = want.depth.iter().map(|&z| z.into()).collect();
@@ -125,8 +126,8 @@ impl Scene {
             bench.plan.rounds = Rounds { rays, samples: rays * quota, most_quota: quota, band, ..ordinary };
             let (view, case) = (self.render(bench)?, format!("{}, rounds of {quota}", self.name()));
             let size = |i: usize| 1.0 + colors[i].abs();
-            tally.each(&format!("{case}, colour"), view.color.as_flattened(), &colors, size);
-            tally.each(&format!("{case}, depth"), &view.depth, &depths, |i| 1.0 + depths[i]);
+            result.each(&format!("{case}, colour"), view.color.as_flattened(), &colors, size);
+            result.each(&format!("{case}, depth"), &view.depth, &depths, |i| 1.0 + depths[i]);
         }
         bench.plan.rounds = ordinary;
         Ok(())

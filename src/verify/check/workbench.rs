@@ -1,7 +1,7 @@
 //! A device with a plan and all its buffers, on which kernels can be run one by one.
 
 use super::Setup;
-use super::draw::quiet_step;
+use super::inputs::quiet_step;
 use crate::field::layout::DENSITY_OUTPUTS;
 use crate::field::{
     Counters, Field, Plan, RayResult, RayTarget, Step, Workspace, backward, color, composite, density,

@@ -5,7 +5,7 @@ use glam::DAffine3;
 
 use crate::capture::dataset::listing::{Entry, Listing};
 use crate::capture::dataset::notes::Notes;
-use crate::capture::focus::{Axis, FocusKind, find};
+use crate::capture::focus::{FocusKind, OpticalAxis, find};
 use crate::support::format::few;
 
 /// Makes one reading of all poses of a dataset's files. Where nearly all are mirrored, that is how they are meant,
@@ -77,8 +77,8 @@ fn meet_in_front(entries: &[&Entry]) -> bool {
         return false;
     }
     let pose = |entry: &&Entry| entry.world_from_camera;
-    let axis = |pose: DAffine3| Axis::along(pose.translation, pose.matrix3.z_axis);
-    let axes: Vec<Axis> = entries.iter().map(pose).map(axis).collect();
+    let axis = |pose: DAffine3| OpticalAxis::along(pose.translation, pose.matrix3.z_axis);
+    let axes: Vec<OpticalAxis> = entries.iter().map(pose).map(axis).collect();
     let focus = find(&axes);
     let ahead = axes.iter().filter(|axis| axis.along_and_across(focus.point).0 > 0.0);
     focus.kind == FocusKind::Crossing && 10 * ahead.count() >= 8 * axes.len()

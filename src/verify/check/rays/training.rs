@@ -8,8 +8,8 @@ use crate::field::{self, RayTarget, SceneFeatures, dimension, rays};
 use crate::gpu::paged_array::ROW;
 use crate::photo::Photo;
 use crate::photo::{Image, Pixels};
-use crate::verify::check::draw::{Random, SEED, STEP, uniform};
-use crate::verify::check::{Setup, Subject, Tally, Workbench};
+use crate::verify::check::inputs::{Random, SEED, STEP, uniform};
+use crate::verify::check::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::verify::reference::random::random_u32;
 use anyhow::Result;
 use glam::DVec2;
@@ -47,9 +47,9 @@ struct Photos {
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn training_rays(subject: &Subject) -> Result<Tally> {
-    let mut tally =
-        Tally::new("rays of a training", 4e-7, "a rotation, a unit vector, a product of colours round");
+pub fn training_rays(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result =
+        CheckResult::new("rays of a training", 4e-7, "a rotation, a unit vector, a product of colours round");
     let kind = |alpha, hdr, deep, masks, depth| SceneFeatures {
         alpha,
         hdr,
@@ -71,17 +71,17 @@ pub fn training_rays(subject: &Subject) -> Result<Tally> {
         let lenses = LENSES.iter().map(Lens::kind).collect();
         setup.features = SceneFeatures { lenses, ..features };
         setup.bounds = bounds();
-        let mut bench = subject.workbench(setup)?;
+        let mut bench = adapter.workbench(setup)?;
         let photos = Photos::upload(&mut bench, &mut Random::new(41))?;
         let stage = rays::stage(&bench.gpu, &bench.plan, &bench.workspace, SIZES.len())?;
         for count in [1, 3, 65, 250] {
             bench.set_rays(count);
             bench.run([&stage])?;
             let case = format!("{background:?}, {:?}, {count} rays", bench.plan.features);
-            photos.compare(&mut tally, &case, &bench, count)?;
+            photos.compare(&mut result, &case, &bench, count)?;
         }
     }
-    Ok(tally)
+    Ok(result)
 }
 
 impl Photos {
@@ -110,7 +110,7 @@ impl Photos {
         Ok(Self { cameras, photos, counting })
     }
 
-    fn compare(&self, tally: &mut Tally, case: &str, bench: &Workbench, count: usize) -> Result<()> {
+    fn compare(&self, result: &mut CheckResult, case: &str, bench: &Workbench, count: usize) -> Result<()> {
         let targets: Vec<RayTarget> = bench.read("ray_targets", count)?;
         let features = &bench.plan.features;
         let pixels: Vec<u32> = self.counting.iter().map(|counting| counting.len() as u32).collect();
@@ -122,17 +122,17 @@ impl Photos {
             let pixel =
                 DVec2::new(f64::from(texel % camera.width) + 0.5, f64::from(texel / camera.width) + 0.5);
             if let Some(want) = camera.ray(pixel).filter(|_| !is_close_to_a_fold(camera, pixel)) {
-                tally.each(&case, &ray.direction.to_array(), &want.direction.to_array(), |_| 1.0);
+                result.each(&case, &ray.direction.to_array(), &want.direction.to_array(), |_| 1.0);
                 if features.depth {
                     let depth = f64::from(photo.depth[texel as usize] * UNITS.depth);
                     let distance = depth / camera.depth_of_unit(want.direction);
-                    tally.value(targets[index].depth.into(), distance, 1.0 + distance, || {
+                    result.value(targets[index].depth.into(), distance, 1.0 + distance, || {
                         format!("{case}, depth")
                     });
                 }
                 let origin = (want.origin - bounds().min()) / (2.0 * bounds().outer_half());
                 let size = 1.0 + origin.abs().max_element();
-                tally.each(&format!("{case}, origin"), &ray.origin.to_array(), &origin.to_array(), |_| size);
+                result.each(&format!("{case}, origin"), &ray.origin.to_array(), &origin.to_array(), |_| size);
             }
             let behind = match bench.plan.config.background {
                 Background::Random => {
@@ -143,8 +143,8 @@ impl Photos {
             let [r, g, b, alpha] = target(&photo.image.pixels, texel as usize, features.alpha);
             let over = |color: f64, channel: usize| color + (1.0 - alpha) * behind[channel];
             let target = [over(r, 0), over(g, 1), over(b, 2), alpha];
-            tally.each(&format!("{case}, target"), &targets[index].color, &target, |_| 1.0);
-            tally.each(&format!("{case}, background"), &targets[index].background, &behind, |_| 1.0);
+            result.each(&format!("{case}, target"), &targets[index].color, &target, |_| 1.0);
+            result.each(&format!("{case}, background"), &targets[index].background, &behind, |_| 1.0);
         }
         Ok(())
     }

@@ -4,8 +4,8 @@ use super::{DeviceRay, begin_rays, bounds, camera, is_close_to_a_fold};
 use crate::camera::{Camera, Lens, LensKind};
 use crate::field::{self, viewing};
 use crate::gpu::pass::Stage;
-use crate::verify::check::draw::Random;
-use crate::verify::check::{Setup, Subject, Tally, Workbench};
+use crate::verify::check::inputs::Random;
+use crate::verify::check::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::verify::reference::lens::{self, LensRay};
 use crate::verify::reference::march::{BoxRay, box_interval};
 use anyhow::Result;
@@ -67,13 +67,14 @@ const MODELS: [Model; 16] = [
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn view_rays(subject: &Subject) -> Result<Vec<Tally>> {
-    let mut rays = Tally::new("rays of a view", 6e-7, "a rotation, a unit vector and six quotients round");
+pub fn view_rays(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
+    let mut rays =
+        CheckResult::new("rays of a view", 6e-7, "a rotation, a unit vector and six quotients round");
     let mut trips = trips("lens: round trips");
     let mut random = Random::new(40);
     let mixed = LensKind::ALL.to_vec();
     for linked in LensKind::ALL.map(|kind| vec![kind]).into_iter().chain([mixed]) {
-        let bench = Bench::new(subject, &linked, 256)?;
+        let bench = Bench::new(adapter, &linked, 256)?;
         for model in MODELS.iter().filter(|model| linked.contains(&model.lens.kind())) {
             let camera = camera(&mut random, (17, 13), model.lens);
             let none = View::new(model, camera, &bench).compare(&mut rays, &mut trips)?;
@@ -89,15 +90,15 @@ pub fn view_rays(subject: &Subject) -> Result<Vec<Tally>> {
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn sharp_rays(subject: &Subject) -> Result<Vec<Tally>> {
-    let mut pixels = Tally::new(
+pub fn sharp_rays(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
+    let mut pixels = CheckResult::new(
         "lens: pixels of a large image",
         2e-4,
         "a direction and the point of the plane it goes through round, 1500 pixels to the radian",
     );
     let mut angles = trips("lens: large images");
     let mut random = Random::new(42);
-    let bench = Bench::new(subject, &LensKind::ALL, 1024)?;
+    let bench = Bench::new(adapter, &LensKind::ALL, 1024)?;
     for model in &MODELS {
         let camera = camera(&mut random, (1000, 750), model.lens);
         View::new(model, camera, &bench).measure(&mut pixels, &mut angles)?;
@@ -106,8 +107,8 @@ pub fn sharp_rays(subject: &Subject) -> Result<Vec<Tally>> {
 }
 
 /// Errors of pixels over how much the lens stretches.
-fn trips(name: &str) -> Tally {
-    Tally::new(
+fn trips(name: &str) -> CheckResult {
+    CheckResult::new(
         name,
         4e-7,
         "in radians or box units: a rotation and six more roundings, and Newton's method's last step",
@@ -121,12 +122,12 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(subject: &Subject, lenses: &[LensKind], rays: usize) -> Result<Self> {
+    fn new(adapter: &CheckedAdapter, lenses: &[LensKind], rays: usize) -> Result<Self> {
         let mut setup = Setup::tiny();
         setup.features.lenses = lenses.iter().copied().collect();
         setup.bounds = super::bounds();
         setup.config.batch.rays = rays;
-        let mut bench = subject.workbench(setup)?;
+        let mut bench = adapter.workbench(setup)?;
         bench.workspace.allocate(&bench.gpu, &viewing::buffers(&bench.plan))?;
         let stage = viewing::rays(&bench.gpu, &bench.plan, &bench.workspace)?;
         Ok(Self { bench, stage })
@@ -148,7 +149,7 @@ impl<'a> View<'a> {
     }
 
     /// Compares all pixels; returns how many have no ray.
-    fn compare(&self, rays: &mut Tally, trips: &mut Tally) -> Result<usize> {
+    fn compare(&self, rays: &mut CheckResult, trips: &mut CheckResult) -> Result<usize> {
         let Self { name, camera, bench, .. } = self;
         let mut none = 0;
         // Two chunks of which the second starts in the middle of a row.
@@ -183,7 +184,7 @@ impl<'a> View<'a> {
     }
 
     /// Some rows of a large image, there and back: the error in pixels, and over what a ray moves the image.
-    fn measure(&self, pixels: &mut Tally, angles: &mut Tally) -> Result<()> {
+    fn measure(&self, pixels: &mut CheckResult, angles: &mut CheckResult) -> Result<()> {
         let camera = &self.camera;
         for row in (0..camera.height).step_by(62).chain([camera.height - 1]) {
             let first = (row * camera.width) as usize;
@@ -255,15 +256,15 @@ impl<'a> View<'a> {
 }
 
 /// Where a ray is in the box, from its own origin and direction.
-fn compare_interval(tally: &mut Tally, ray: &DeviceRay, near: f64, case: impl Fn() -> String) {
+fn compare_interval(result: &mut CheckResult, ray: &DeviceRay, near: f64, case: impl Fn() -> String) {
     let want = box_interval(BoxRay { origin: ray.origin, direction: ray.direction }, near);
     match want {
         // A graze that rounding decides.
         Some([t_near, t_far]) if t_far - t_near < 1e-5 => {}
         Some([t_near, t_far]) => {
-            tally.value(ray.t_near, t_near, 1.0 + t_near, || format!("{}: into the box", case()));
-            tally.value(ray.t_far, t_far, 1.0 + t_far, || format!("{}: out of the box", case()));
+            result.value(ray.t_near, t_near, 1.0 + t_near, || format!("{}: into the box", case()));
+            result.value(ray.t_far, t_far, 1.0 + t_far, || format!("{}: out of the box", case()));
         }
-        None => tally.holds(ray.t_far - ray.t_near < 1e-5, || format!("{}: past the box", case())),
+        None => result.holds(ray.t_far - ray.t_near < 1e-5, || format!("{}: past the box", case())),
     }
 }

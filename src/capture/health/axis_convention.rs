@@ -1,9 +1,9 @@
 //! Poses that are all read the wrong way: other axes, or the inverse matrix.
 
-use super::gaze::Gaze;
+use super::view_directions::ViewDirections;
 use super::{Finding, Scene};
 use crate::camera::Camera;
-use crate::capture::focus::{Axis, FocusKind, find};
+use crate::capture::focus::{FocusKind, OpticalAxis, find};
 use crate::support::format::{percent, point};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -17,7 +17,7 @@ const NEAR: f64 = 0.3;
 const DOUBTFUL: f64 = 0.5;
 
 /// Another way to read a pose.
-struct Reading {
+struct AxisConvention {
     name: &'static str,
     remedy: &'static str,
     turn: fn(DAffine3) -> DAffine3,
@@ -25,20 +25,20 @@ struct Reading {
     is_turned_round: bool,
 }
 
-const READINGS: [Reading; 3] = [
-    Reading {
+const CONVENTIONS: [AxisConvention; 3] = [
+    AxisConvention {
         name: "in OpenCV's axes (right, down, forward)",
         remedy: "change the sign of the second and third column of every `transform_matrix`",
         turn: from_open_cv,
         is_turned_round: true,
     },
-    Reading {
+    AxisConvention {
         name: "world-to-camera",
         remedy: "write the inverse of every `transform_matrix`",
         turn: |pose| pose.inverse(),
         is_turned_round: false,
     },
-    Reading {
+    AxisConvention {
         name: "world-to-camera in OpenCV's axes (right, down, forward)",
         remedy: "write the inverse of every `transform_matrix` with the sign of its second and third column changed",
         turn: |pose| from_open_cv(pose.inverse()),
@@ -59,15 +59,20 @@ struct Agreement {
 }
 
 /// Whether another reading of all poses makes the cameras look at one point, which they do not as they are.
-pub(super) fn examine(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
-    let looks = gaze.meets || gaze.seeing >= DOUBTFUL;
+pub(super) fn examine(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Finding> {
+    let looks = directions.meets || directions.seeing >= DOUBTFUL;
     if looks || scene.count() < LEAST_VIEWS {
         return Vec::new();
     }
-    let readings = READINGS.iter().filter_map(|reading| Some((reading, agreement(scene, reading.turn)?)));
-    let best = readings.min_by(|(_, a), (_, b)| a.miss.total_cmp(&b.miss));
-    let Some((reading, agreement)) = best else { return Vec::new() };
-    let few = if gaze.seeing > 0.0 { format!("only {}", percent(gaze.seeing)) } else { "none".to_owned() };
+    let conventions =
+        CONVENTIONS.iter().filter_map(|convention| Some((convention, agreement(scene, convention.turn)?)));
+    let best = conventions.min_by(|(_, a), (_, b)| a.miss.total_cmp(&b.miss));
+    let Some((convention, agreement)) = best else { return Vec::new() };
+    let few = if directions.seeing > 0.0 {
+        format!("only {}", percent(directions.seeing))
+    } else {
+        "none".to_owned()
+    };
     let seen = format!(
         "as they are, {few} of the cameras see a common point; read that way, {} see {} and their axes pass it at {} of \
          the distance",
@@ -75,19 +80,19 @@ pub(super) fn examine(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
         point(agreement.focus, scene.extent()),
         percent(agreement.miss)
     );
-    vec![if reading.is_turned_round && gaze.up.z > 0.5 {
+    vec![if convention.is_turned_round && directions.up.z > 0.5 {
         // Turned round, these cameras would be upside down in a world whose z points up.
         Finding::note(format!(
             "the cameras look outwards, which is right for photos taken around oneself; they may be {}: {seen}. If the \
              subject was in the middle, {}",
-            reading.name, reading.remedy
+            convention.name, convention.remedy
         ))
     } else {
         Finding::warning(format!(
             "the poses are probably {}: {seen}; {}{}",
-            reading.name,
-            reading.remedy,
-            if reading.is_turned_round {
+            convention.name,
+            convention.remedy,
+            if convention.is_turned_round {
                 ", unless the photos were taken outwards from one spot"
             } else {
                 ""
@@ -99,12 +104,12 @@ pub(super) fn examine(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
 /// How well the cameras agree when their poses are read that way; `None` where they do not.
 fn agreement(scene: &Scene<'_>, turn: fn(DAffine3) -> DAffine3) -> Option<Agreement> {
     let axis = |camera: &Camera| {
-        Axis::of(&Camera { world_from_camera: turn(camera.world_from_camera), ..camera.clone() })
+        OpticalAxis::of(&Camera { world_from_camera: turn(camera.world_from_camera), ..camera.clone() })
     };
-    let axes: Vec<Axis> = scene.cameras().map(axis).collect();
+    let axes: Vec<OpticalAxis> = scene.cameras().map(axis).collect();
     let focus = find(&axes);
     let seeing = axes.iter().filter(|axis| axis.sees(focus.point)).count() as f64 / axes.len() as f64;
-    let miss = |axis: &Axis| {
+    let miss = |axis: &OpticalAxis| {
         let (along, across) = axis.along_and_across(focus.point);
         across / along.abs().max(f64::MIN_POSITIVE)
     };

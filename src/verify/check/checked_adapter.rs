@@ -1,4 +1,4 @@
-//! What is checked: an adapter, and the variants its kernels are linked from.
+//! An adapter under check, and the variants its kernels are linked from.
 
 use super::{Setup, Workbench};
 use crate::config::Accumulation;
@@ -22,13 +22,13 @@ pub struct Forced {
 
 /// An adapter under check.
 #[derive(Clone, Debug)]
-pub struct Subject {
+pub struct CheckedAdapter {
     /// The adapter.
     pub gpu: Arc<Gpu>,
     forced: Forced,
 }
 
-impl Subject {
+impl CheckedAdapter {
     /// The adapter with these variants.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 /// Where the cameras look.
 #[derive(Clone, Debug)]
-pub struct Gaze {
+pub struct ViewDirections {
     /// The point the axes meet in, or what stands for it; world space.
     pub focus: DVec3,
     /// Whether the axes meet there.
@@ -66,7 +66,7 @@ const STEEP: f64 = 0.9;
 /// Part of the pictures that are rolled on purpose now and then.
 const MANY_ROLLED: f64 = 0.25;
 
-impl Gaze {
+impl ViewDirections {
     pub(super) fn of(scene: &Scene<'_>) -> Self {
         let focus = scene.focus.point;
         let cameras: Vec<_> = scene.cameras().cloned().collect();

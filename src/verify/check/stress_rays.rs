@@ -1,13 +1,13 @@
 //! Rays on which compositing in single precision goes wrong where anything is done carelessly.
 
-use super::draw::Random;
+use super::inputs::Random;
 use crate::verify::reference::Transmittance;
 use crate::verify::reference::composite::{CompositeInput, composite};
 use crate::verify::reference::vectors::{Expected, GoldenFile, GoldenRay};
 
 /// A ray with its own memory; its numbers are those of single precision.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct HardRay {
+pub struct StressRay {
     /// What is hard about it.
     pub name: String,
     /// Log-densities.
@@ -24,7 +24,7 @@ pub struct HardRay {
 
 /// Where a sample is.
 #[derive(Clone, Copy)]
-struct Place {
+struct SamplePlace {
     /// Which of the ray's samples.
     i: f64,
     /// Samples of the ray, at least 1.
@@ -35,7 +35,7 @@ struct Place {
 
 /// The colours of a ray.
 #[derive(Clone, Copy, PartialEq)]
-enum Light {
+enum RayColors {
     /// Within 0..1.
     Display,
     /// From 1e-5 to 1e8, evenly in their logarithm.
@@ -50,86 +50,90 @@ enum Light {
     Last,
 }
 
-/// A kind of hard rays.
-struct Kind {
+/// A kind of stress rays.
+struct RayKind {
     name: &'static str,
-    light: Light,
+    light: RayColors,
     /// `ln τ` and `ln δ` of a sample. Beyond ±1e6, the first is the log-density itself.
-    depth: fn(&mut Random, Place) -> [f64; 2],
+    depth: fn(&mut Random, SamplePlace) -> [f64; 2],
 }
 
-const fn kind(name: &'static str, light: Light, depth: fn(&mut Random, Place) -> [f64; 2]) -> Kind {
-    Kind { name, light, depth }
+const fn kind(
+    name: &'static str,
+    light: RayColors,
+    depth: fn(&mut Random, SamplePlace) -> [f64; 2],
+) -> RayKind {
+    RayKind { name, light, depth }
 }
 
 /// Logarithm of a share of an optical depth from 0.1 to 300.
-fn share(place: Place) -> f64 {
+fn share(place: SamplePlace) -> f64 {
     (0.1 * 3000f64.powf(place.level) / place.n).ln()
 }
 
-const KINDS: [Kind; 24] = [
-    kind("ordinary", Light::Display, |r, _| [r.number(-6.0, 1.0), r.number(-6.0, -1.0)]),
-    kind("thin everywhere", Light::Display, |_, at| [-23.0 + 20.0 * at.level, -4.0]),
-    kind("thin, against the light", Light::Last, |_, at| [-23.0 + 20.0 * at.level, -4.0]),
-    kind("even fog", Light::Display, |_, at| [share(at), -4.0]),
-    kind("bright even fog", Light::Bright, |_, at| [share(at), -4.0]),
-    kind("uneven bright fog", Light::Bright, |r, at| {
+const KINDS: [RayKind; 24] = [
+    kind("ordinary", RayColors::Display, |r, _| [r.number(-6.0, 1.0), r.number(-6.0, -1.0)]),
+    kind("thin everywhere", RayColors::Display, |_, at| [-23.0 + 20.0 * at.level, -4.0]),
+    kind("thin, against the light", RayColors::Last, |_, at| [-23.0 + 20.0 * at.level, -4.0]),
+    kind("even fog", RayColors::Display, |_, at| [share(at), -4.0]),
+    kind("bright even fog", RayColors::Bright, |_, at| [share(at), -4.0]),
+    kind("uneven bright fog", RayColors::Bright, |r, at| {
         [share(at) + r.number(-3.0, 1.0), r.number(-60.0, 20.0)]
     }),
-    kind("even fog of one colour", Light::Uniform, |_, at| [share(at), -4.0]),
-    kind("haze of one colour before another", Light::Two, |_, at| {
+    kind("even fog of one colour", RayColors::Uniform, |_, at| [share(at), -4.0]),
+    kind("haze of one colour before another", RayColors::Two, |_, at| {
         [(0.3f64.powf(1.0 + 6.0 * at.level) / at.n).ln(), -4.0]
     }),
-    kind("haze of one colour before another", Light::Two, |_, at| {
+    kind("haze of one colour before another", RayColors::Two, |_, at| {
         [(0.9 - 0.4 * at.level).ln() - at.n.ln(), -4.0]
     }),
     // Each of them is too little to change the sum on its own.
-    kind("motes behind half a wall", Light::Motes, |_, at| {
+    kind("motes behind half a wall", RayColors::Motes, |_, at| {
         [if at.i < 1.0 { -0.3665 } else { -17.0 + 0.3 * at.level }, -4.0]
     }),
-    kind("even fog of one colour before another", Light::Two, |_, at| [share(at), -4.0]),
-    kind("dark fog before a light", Light::Last, |_, at| [share(at), -4.0]),
-    kind("wall behind fog", Light::Display, |r, at| {
+    kind("even fog of one colour before another", RayColors::Two, |_, at| [share(at), -4.0]),
+    kind("dark fog before a light", RayColors::Last, |_, at| [share(at), -4.0]),
+    kind("wall behind fog", RayColors::Display, |r, at| {
         [if at.i + 1.0 < at.n { share(at) } else { r.number(2.0, 69.0) }, -6.0]
     }),
-    kind("bright wall behind fog", Light::Bright, |r, at| {
+    kind("bright wall behind fog", RayColors::Bright, |r, at| {
         [if at.i + 1.0 < at.n { share(at) } else { r.number(2.0, 69.0) }, -6.0]
     }),
-    kind("wall in front", Light::Bright, |r, at| {
+    kind("wall in front", RayColors::Bright, |r, at| {
         [if at.i < 1.0 { r.number(2.0, 6.0) } else { share(at) }, -6.0]
     }),
-    kind("every other step empty", Light::Display, |r, at| {
+    kind("every other step empty", RayColors::Display, |r, at| {
         [r.number(-2.0, 4.0), if at.i % 2.0 < 1.0 { f64::NEG_INFINITY } else { -5.0 }]
     }),
-    kind("sixty decades", Light::Display, |r, _| [r.number(-69.0, 69.0), r.number(-100.0, 69.0)]),
-    kind("sixty decades, bright", Light::Bright, |r, _| [r.number(-69.0, 69.0), r.number(-100.0, 69.0)]),
-    kind("huge densities, tiny steps", Light::Display, |r, at| [share(at), r.number(-87.0, -80.0)]),
-    kind("subnormal steps", Light::Display, |r, at| {
+    kind("sixty decades", RayColors::Display, |r, _| [r.number(-69.0, 69.0), r.number(-100.0, 69.0)]),
+    kind("sixty decades, bright", RayColors::Bright, |r, _| [r.number(-69.0, 69.0), r.number(-100.0, 69.0)]),
+    kind("huge densities, tiny steps", RayColors::Display, |r, at| [share(at), r.number(-87.0, -80.0)]),
+    kind("subnormal steps", RayColors::Display, |r, at| {
         [share(at) + r.number(-4.0, 1.0), r.number(-102.0, -87.0)]
     }),
-    kind("vast steps", Light::Display, |r, at| [share(at), r.number(60.0, 85.0)]),
-    kind("beyond all densities", Light::Display, |r, at| {
+    kind("vast steps", RayColors::Display, |r, at| [share(at), r.number(60.0, 85.0)]),
+    kind("beyond all densities", RayColors::Display, |r, at| {
         [
             [1e30, -1e30, share(at), 1e7][r.number(0.0, 4.0) as usize],
             [-87.0, 0.0][r.number(0.0, 2.0) as usize],
         ]
     }),
-    kind("at the end of the series", Light::Display, |r, _| [r.number(0.34, 0.36).ln(), -2.0]),
-    kind("ever denser", Light::Bright, |_, at| [-50.0 + 60.0 * at.i / at.n, -30.0 * at.level]),
+    kind("at the end of the series", RayColors::Display, |r, _| [r.number(0.34, 0.36).ln(), -2.0]),
+    kind("ever denser", RayColors::Bright, |_, at| [-50.0 + 60.0 * at.i / at.n, -30.0 * at.level]),
 ];
 
-impl HardRay {
+impl StressRay {
     /// How many kinds there are.
     pub const KINDS: usize = KINDS.len();
 
     /// A random ray of one of the kinds, counted round.
     pub fn new(random: &mut Random, number: usize, samples: usize) -> Self {
-        let Kind { name, light, depth } = KINDS[number % Self::KINDS];
+        let RayKind { name, light, depth } = KINDS[number % Self::KINDS];
         let n = samples.max(1) as f64;
         let level = random.number(0.0, 1.0);
         let mut ray = Self { name: format!("{name}, {samples} samples, {level:.3}"), ..Self::default() };
         for i in 0..samples {
-            let [ln_tau, ln_delta] = depth(random, Place { i: i as f64, n, level });
+            let [ln_tau, ln_delta] = depth(random, SamplePlace { i: i as f64, n, level });
             let delta = single(ln_delta.exp());
             ray.delta.push(delta);
             let s = if delta == 0.0 || ln_tau.abs() > 1e6 { ln_tau } else { ln_tau - delta.ln() };
@@ -141,9 +145,9 @@ impl HardRay {
         let [r, g, b] = color(random, light, is_lit);
         ray.target = [r, g, b, random.number(0.0, 1.0)];
         match light {
-            Light::Uniform => ray.color.fill(ray.background),
-            Light::Two => ray.color.fill(color(random, light, false)),
-            Light::Motes => (ray.background, ray.target) = ([single(0.51); 3], [0.0; 4]),
+            RayColors::Uniform => ray.color.fill(ray.background),
+            RayColors::Two => ray.color.fill(color(random, light, false)),
+            RayColors::Motes => (ray.background, ray.target) = ([single(0.51); 3], [0.0; 4]),
             _ => {}
         }
         ray
@@ -206,12 +210,12 @@ fn single(x: f64) -> f64 {
     f64::from(x as f32)
 }
 
-fn color(random: &mut Random, light: Light, is_last: bool) -> [f64; 3] {
+fn color(random: &mut Random, light: RayColors, is_last: bool) -> [f64; 3] {
     std::array::from_fn(|_| match light {
-        Light::Motes => 1.0,
-        Light::Display | Light::Uniform | Light::Two => random.number(0.0, 1.0),
-        Light::Bright => single(10f64.powf(random.number(-5.0, 8.0))),
-        Light::Last => {
+        RayColors::Motes => 1.0,
+        RayColors::Display | RayColors::Uniform | RayColors::Two => random.number(0.0, 1.0),
+        RayColors::Bright => single(10f64.powf(random.number(-5.0, 8.0))),
+        RayColors::Last => {
             if is_last {
                 random.number(0.5e8, 1e8)
             } else {

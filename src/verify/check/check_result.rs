@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// How far a kernel is from the reference at most.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Tally {
+pub struct CheckResult {
     /// What was compared.
     pub name: String,
     /// Values and conditions compared.
@@ -23,7 +23,7 @@ pub struct Tally {
     pub case: String,
 }
 
-impl Tally {
+impl CheckResult {
     /// Nothing compared yet.
     #[must_use]
     pub fn new(name: impl Into<String>, bound: f64, source: &'static str) -> Self {
@@ -91,28 +91,32 @@ mod tests {
 
     #[test]
     fn errors_are_relative_and_the_worst_is_named() {
-        let mut tally = Tally::new("test", 1e-3, "a test");
-        assert!(!tally.pass, "nothing was compared");
-        tally.all("small", &[1.0, 100.0], &[1.01, 100.0]);
-        assert!(tally.pass && tally.cases == 3 && (tally.worst - 1e-4).abs() < 1e-12);
-        tally.each("large", &[5.0], &[4.0], |_| 100.0);
-        assert!(!tally.pass && tally.case.contains("large, value 0: 5e0 instead of 4e0"), "{}", tally.case);
+        let mut result = CheckResult::new("test", 1e-3, "a test");
+        assert!(!result.pass, "nothing was compared");
+        result.all("small", &[1.0, 100.0], &[1.01, 100.0]);
+        assert!(result.pass && result.cases == 3 && (result.worst - 1e-4).abs() < 1e-12);
+        result.each("large", &[5.0], &[4.0], |_| 100.0);
+        assert!(
+            !result.pass && result.case.contains("large, value 0: 5e0 instead of 4e0"),
+            "{}",
+            result.case
+        );
     }
 
     #[test]
     fn what_is_not_a_number_fails() {
         for got in [f64::NAN, f64::INFINITY] {
-            let mut tally = Tally::new("test", 1.0, "a test");
-            tally.value(got, 1.0, 1.0, || "here".into());
-            assert!(!tally.pass && tally.worst == NOT_FINITE);
+            let mut result = CheckResult::new("test", 1.0, "a test");
+            result.value(got, 1.0, 1.0, || "here".into());
+            assert!(!result.pass && result.worst == NOT_FINITE);
         }
-        let mut tally = Tally::new("test", 1.0, "a test");
-        tally.all("short", &[1.0], &[1.0, 2.0]);
-        assert!(!tally.pass);
-        tally = Tally::new("test", 1.0, "a test");
-        tally.value(0.0, 0.0, 0.0, || "nothing".into());
-        assert!(tally.pass && tally.worst == 0.0);
-        tally.value(1e-300, 0.0, 0.0, || "something".into());
-        assert!(!tally.pass);
+        let mut result = CheckResult::new("test", 1.0, "a test");
+        result.all("short", &[1.0], &[1.0, 2.0]);
+        assert!(!result.pass);
+        result = CheckResult::new("test", 1.0, "a test");
+        result.value(0.0, 0.0, 0.0, || "nothing".into());
+        assert!(result.pass && result.worst == 0.0);
+        result.value(1e-300, 0.0, 0.0, || "something".into());
+        assert!(!result.pass);
     }
 }

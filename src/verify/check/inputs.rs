@@ -1,4 +1,4 @@
-//! What the checks draw at random, and the numbers that the kernels draw.
+//! Inputs of the checks: what they draw at random, and the numbers that the kernels draw.
 
 use crate::field::Step;
 use crate::verify::reference::model::{RaySample, TrainingRay};
