@@ -1,6 +1,7 @@
 //! From files to cameras and photos: reading a dataset, and saying what is wrong with it.
 
 pub mod dataset;
+pub mod diagnostics;
 pub(crate) mod focus;
 pub mod health;
 pub mod image;

@@ -2,7 +2,8 @@
 
 use crate::cli::Global;
 use crate::flags::spoken;
-use nerf::capture::dataset::{Dataset, Severity};
+use nerf::capture::dataset::Dataset;
+use nerf::capture::diagnostics::Severity;
 use nerf::run::depths::fog;
 use std::io::Write;
 
@@ -52,7 +53,9 @@ impl Remarks {
         for note in &dataset.notes {
             match note.severity {
                 Severity::Note => self.say(&format!("note: {}", spoken(&note.message, note.remedy.as_ref()))),
-                Severity::Warning => self.warn(&spoken(&note.message, note.remedy.as_ref())),
+                Severity::Warning | Severity::Error => {
+                    self.warn(&spoken(&note.message, note.remedy.as_ref()))
+                }
             }
         }
     }

@@ -1,20 +1,21 @@
 //! What is healthy or wrong about a dataset, seen from its cameras and pixels before anything is trained.
 //!
 //! [`Survey`] looks at cameras and scene box, [`photos::Look`] at one photo and [`photos::Gallery`] at all of them,
-//! and [`map`] draws the cameras. Every [`Finding`] says what is wrong, how it was seen, and what to do.
+//! and [`map`] draws the cameras. Every [`Diagnostic`] says what is wrong, how it was seen, and what to do.
 
 mod axis_convention;
 mod coverage;
-mod finding;
 pub mod map;
 mod optics;
 pub mod photos;
 mod poses;
+mod spread;
 mod view_directions;
 
+use crate::capture::diagnostics::Diagnostic;
 pub use coverage::Coverage;
-pub use finding::{Finding, Severity, Spread};
 pub use optics::Optics;
+pub use spread::Spread;
 pub use view_directions::{Arrangement, ViewDirections};
 
 use crate::camera::Camera;
@@ -37,7 +38,7 @@ pub struct Survey {
     /// Pairs of frames with different images and the same pose.
     pub same_pose: Vec<[usize; 2]>,
     /// What looks wrong, worst first.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<Diagnostic>,
 }
 
 impl Survey {
@@ -65,7 +66,7 @@ impl Survey {
 
     /// What stands out among the photos, of those that were looked at.
     #[must_use]
-    pub fn findings_with(&self, gallery: Option<&Gallery>, dataset: &Dataset) -> Vec<Finding> {
+    pub fn findings_with(&self, gallery: Option<&Gallery>, dataset: &Dataset) -> Vec<Diagnostic> {
         let Some(gallery) = gallery else {
             return poses::about_repeated(dataset, &self.same_pose, None).into_iter().collect();
         };

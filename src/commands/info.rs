@@ -10,9 +10,10 @@ use crate::flags::{spoken, told};
 use crate::progress::Progress;
 use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
+use nerf::capture::diagnostics::{Diagnostic, Severity};
+use nerf::capture::health::Survey;
 use nerf::capture::health::map;
 use nerf::capture::health::photos::{Gallery, Look};
-use nerf::capture::health::{Finding, Severity, Survey};
 use nerf::photo::Reading;
 use nerf::run::Estimate;
 use nerf::support::file::write_atomically;
@@ -32,7 +33,7 @@ struct Report<'a> {
     /// `None` where there is nothing to train on.
     memory: Option<Estimate>,
     /// Worst first.
-    problems: Vec<Finding>,
+    problems: Vec<Diagnostic>,
 }
 
 pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
@@ -91,14 +92,14 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
 }
 
 /// Decodes all photos, in parallel, and keeps what matters of each.
-fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, Vec<Finding>) {
+fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, Vec<Diagnostic>) {
     let progress = Progress::new(session.remarks, "looking");
     let done = AtomicUsize::new(0);
     let looks: Vec<_> = (views.par_iter())
         .map(|&index| {
             let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
             progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
-            look.map_err(|error| Finding::error(told(&error)).about(vec![index]))
+            look.map_err(|error| Diagnostic::error(told(&error)).about(vec![index]))
         })
         .collect();
     let (looks, failures): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);

@@ -11,8 +11,9 @@ use anyhow::{Result, bail, ensure};
 use glam::{DAffine3, DVec2};
 
 use super::json::{Fields, REMEDY};
-use super::notes::{Note, Notes, Severity};
+use super::notes::Notes;
 use crate::camera::{Camera, Lens};
+use crate::capture::diagnostics::{Diagnostic, Severity};
 use extent::{Extent, Measure};
 use focal::{Angles, Focal};
 
@@ -112,7 +113,7 @@ impl Intrinsics {
 
     /// The camera that took an image of this size in pixels, and what is to be said about it. Lengths in
     /// pixels that belong to another size are scaled.
-    pub fn camera(&self, size: [u32; 2], pose: DAffine3) -> (Camera, Vec<Note>) {
+    pub fn camera(&self, size: [u32; 2], pose: DAffine3) -> (Camera, Vec<Diagnostic>) {
         let actual = DVec2::new(f64::from(size[0]), f64::from(size[1]));
         let mut remarks = Vec::new();
         let (focal_px, center_px) = match self.focal {
@@ -127,9 +128,9 @@ impl Intrinsics {
     }
 
     /// Focal lengths and principal point at the size of an image.
-    fn perspective(&self, focal: Focal, actual: DVec2, remarks: &mut Vec<Note>) -> (DVec2, DVec2) {
+    fn perspective(&self, focal: Focal, actual: DVec2, remarks: &mut Vec<Diagnostic>) -> (DVec2, DVec2) {
         let guess = self.center.and_then(|center| center.guessed_size(actual));
-        let at_actual = |measure: Measure, remarks: &mut Vec<Note>| {
+        let at_actual = |measure: Measure, remarks: &mut Vec<Diagnostic>| {
             let measure = Measure { size: measure.size.or_guess(guess), ..measure };
             let (px, remark) = measure.at(actual);
             if let Some(remark) = remark.filter(|remark| !remarks.contains(remark)) {
@@ -144,15 +145,11 @@ impl Intrinsics {
         let center_px = self.center.map_or(0.5 * actual, |center| at_actual(center, remarks));
         let offset = (center_px / actual - 0.5).abs().max_element();
         if offset > 0.4 {
-            remarks.push(Note {
-                remedy: None,
-                severity: Severity::Warning,
-                message: format!(
-                    "the principal point {:.1}, {:.1} lies at the edge of the image of {}x{} pixels or outside; \
+            remarks.push(Diagnostic::warning(format!(
+                "the principal point {:.1}, {:.1} lies at the edge of the image of {}x{} pixels or outside; \
                      unless the image was cut out of a larger one, `cx` and `cy` are wrong",
-                    center_px.x, center_px.y, actual.x, actual.y
-                ),
-            });
+                center_px.x, center_px.y, actual.x, actual.y
+            )));
         }
         (focal_px, center_px)
     }
@@ -196,16 +193,12 @@ impl Stated {
 }
 
 /// A panorama that is not twice as wide as high hardly shows the whole sphere.
-fn sphere_remark(actual: DVec2) -> Option<Note> {
-    ((0.5 * actual.x / actual.y - 1.0).abs() > 0.02).then(|| Note {
-        remedy: None,
-        severity: Severity::Warning,
-        message: format!(
+fn sphere_remark(actual: DVec2) -> Option<Diagnostic> {
+    ((0.5 * actual.x / actual.y - 1.0).abs() > 0.02).then(|| Diagnostic::warning(format!(
             "an equirectangular image is twice as wide as high, this one has {}x{} pixels; it is taken as the \
              whole sphere, squeezed",
             actual.x, actual.y
-        ),
-    })
+        )))
 }
 
 /// Two numbers that come together; one alone is an error.

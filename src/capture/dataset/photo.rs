@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, ensure};
 
 use super::sidecars::{Depth, Ignores, Mask, Sidecars};
-use super::{Dataset, Frame, look_ahead};
+use super::{Dataset, Frame, prefetch};
 use crate::capture::image::load_depth;
 use crate::capture::image::{Multiplied, Turn, Window, crop, nearest, reduce_any, reduce_depth};
 use crate::photo::{AlphaMode, Photo, Reading};
@@ -63,13 +63,13 @@ impl Dataset {
         each: &mut dyn FnMut(usize, Photo) -> Result<()>,
     ) -> Result<()> {
         let bytes: Vec<_> = indices.iter().map(|&index| self.frames[index].decoding_bytes()).collect();
-        look_ahead::ordered(&bytes, &|position| self.load(indices[position], depth), each)
+        prefetch::prefetch(&bytes, &|position| self.load(indices[position], depth), each)
     }
 
     /// Most bytes of host memory that [`Dataset::stream`] takes for these frames.
     pub fn stream_bytes(&self, indices: &[usize]) -> u64 {
         let largest = indices.iter().map(|&index| self.frames[index].decoding_bytes()).max();
-        look_ahead::most_bytes(indices.len(), largest.unwrap_or(0))
+        prefetch::most_bytes(indices.len(), largest.unwrap_or(0))
     }
 }
 

@@ -19,8 +19,9 @@ use anyhow::Result;
 
 use super::frames;
 use super::json::Fields;
-use super::listing::{DepthEntry, Entry};
-use super::notes::{Notes, Severity};
+use super::listing::{DepthEntry, FrameEntry};
+use super::notes::Notes;
+use crate::capture::diagnostics::Severity;
 use crate::capture::image::Header;
 use crate::photo::BitDepth;
 
@@ -100,7 +101,7 @@ impl<'a> Finder<'a> {
     }
 
     /// The files beside the photo of `entry`, which was found at `image`.
-    pub(super) fn find(&mut self, entry: &Entry, image: &Path, notes: &mut Notes) -> Sidecars {
+    pub(super) fn find(&mut self, entry: &FrameEntry, image: &Path, notes: &mut Notes) -> Sidecars {
         let mut masks = Vec::new();
         if let Some(listed) = &entry.mask_path {
             match frames::locate(self.root, listed) {
@@ -182,7 +183,7 @@ impl<'a> Finder<'a> {
         [long, short].into_iter().find(|path| self.is_there(path))
     }
 
-    fn depth(&self, entry: &Entry, notes: &mut Notes) -> Option<Depth> {
+    fn depth(&self, entry: &FrameEntry, notes: &mut Notes) -> Option<Depth> {
         let listed = entry.depth.as_ref()?;
         let Some((path, _)) = frames::locate(self.root, &listed.path) else {
             notes.frame(Severity::Warning, &entry.label, "its depth file is missing");

@@ -1,7 +1,7 @@
 //! Poses that are all read the wrong way: other axes, or the inverse matrix.
 
 use super::view_directions::ViewDirections;
-use super::{Finding, Scene};
+use super::{Diagnostic, Scene};
 use crate::camera::Camera;
 use crate::capture::focus::{FocusKind, OpticalAxis, find};
 use crate::support::format::{percent, point};
@@ -59,7 +59,7 @@ struct Agreement {
 }
 
 /// Whether another reading of all poses makes the cameras look at one point, which they do not as they are.
-pub(super) fn examine(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Finding> {
+pub(super) fn examine(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Diagnostic> {
     let looks = directions.meets || directions.seeing >= DOUBTFUL;
     if looks || scene.count() < LEAST_VIEWS {
         return Vec::new();
@@ -82,13 +82,13 @@ pub(super) fn examine(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Fin
     );
     vec![if convention.is_turned_round && directions.up.z > 0.5 {
         // Turned round, these cameras would be upside down in a world whose z points up.
-        Finding::note(format!(
+        Diagnostic::note(format!(
             "the cameras look outwards, which is right for photos taken around oneself; they may be {}: {seen}. If the \
              subject was in the middle, {}",
             convention.name, convention.remedy
         ))
     } else {
-        Finding::warning(format!(
+        Diagnostic::warning(format!(
             "the poses are probably {}: {seen}; {}{}",
             convention.name,
             convention.remedy,

@@ -1,6 +1,6 @@
 //! How much of the scene box the cameras see, from a grid of rays through every picture.
 
-use super::{Finding, Scene, Spread};
+use super::{Diagnostic, Scene, Spread};
 use crate::camera::Bounds;
 use crate::camera::Camera;
 use crate::support::format::{count, percent};
@@ -58,17 +58,17 @@ impl Coverage {
         Spread::of(self.pictures.iter().map(|picture| picture.inner))
     }
 
-    pub(super) fn findings(&self, scene: &Scene<'_>) -> Vec<Finding> {
+    pub(super) fn findings(&self, scene: &Scene<'_>) -> Vec<Diagnostic> {
         let mut findings = Vec::new();
         let blind = scene.which(|view| self.pictures[view].outer == 0.0);
         if blind.len() == scene.count() {
-            findings.push(Finding::error(
+            findings.push(Diagnostic::error(
                 "no camera sees any of the scene box, so there is nothing to train on; check the poses, or write \
                  `aabb`: [[x, y, z], [x, y, z]], the corners of what to show, into the file",
             ));
         } else if !blind.is_empty() {
             findings.push(
-                Finding::warning(format!(
+                Diagnostic::warning(format!(
                     "{} of {} see nothing of the scene box, and are trained on for nothing: {}; check their poses, or \
                      write a larger box (`aabb`, `aabb_scale`) into the file",
                     blind.len(),
@@ -82,7 +82,7 @@ impl Coverage {
         if !rayless.is_empty() {
             let worst = self.pictures.iter().map(|picture| picture.rayless).fold(0.0, f64::max);
             findings.push(
-                Finding::warning(format!(
+                Diagnostic::warning(format!(
                     "the lens model has no ray for up to {} of the picture in {}: {}; check the distortion \
                      coefficients and `camera_model`",
                     percent(worst),

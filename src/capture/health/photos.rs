@@ -2,7 +2,7 @@
 
 mod grey;
 
-use super::{Finding, Spread, names};
+use super::{Diagnostic, Spread, names};
 use crate::capture::dataset::Dataset;
 use crate::photo::Photo;
 use crate::photo::nothing_counts;
@@ -111,8 +111,8 @@ impl Gallery {
 
     /// What stands out.
     #[must_use]
-    pub fn findings(&self, dataset: &Dataset) -> Vec<Finding> {
-        let mut findings: Vec<Finding> =
+    pub fn findings(&self, dataset: &Dataset) -> Vec<Diagnostic> {
+        let mut findings: Vec<Diagnostic> =
             [self.blurred(dataset), self.uneven(dataset), self.repeated(dataset)]
                 .into_iter()
                 .flatten()
@@ -124,7 +124,7 @@ impl Gallery {
     }
 
     /// Photos that show nothing.
-    fn blank(&self, dataset: &Dataset) -> impl Iterator<Item = Finding> {
+    fn blank(&self, dataset: &Dataset) -> impl Iterator<Item = Diagnostic> {
         type Kind = (fn(&Look) -> bool, &'static str, &'static str);
         let kinds: [Kind; 3] = [
             (
@@ -148,16 +148,16 @@ impl Gallery {
             let number = count(frames.len(), "photo");
             let verb = if frames.len() == 1 { "shows" } else { "show" };
             let message = format!("{number} {verb} {what}: {}; {remedy}", names(dataset, &frames));
-            (!frames.is_empty()).then(|| Finding::warning(message).about(frames))
+            (!frames.is_empty()).then(|| Diagnostic::warning(message).about(frames))
         })
     }
 
     /// Masks that leave nothing to train on.
-    fn ignored(&self, dataset: &Dataset) -> Option<Finding> {
+    fn ignored(&self, dataset: &Dataset) -> Option<Diagnostic> {
         let ignored: HashSet<usize> = self.which(|(_, look)| look.is_ignored).into_iter().collect();
         let nothing_is_left = !dataset.train.is_empty() && dataset.train.iter().all(|i| ignored.contains(i));
         nothing_is_left
-            .then(|| Finding::from(nothing_counts(dataset.train.len())).about(dataset.train.clone()))
+            .then(|| Diagnostic::from(nothing_counts(dataset.train.len())).about(dataset.train.clone()))
     }
 
     /// Whether two frames, which have one pose, show different pictures.
@@ -174,7 +174,7 @@ impl Gallery {
 
     /// Photos less sharp than those before and after. Views of synthetic scenes follow in any order, so all photos
     /// together must be sharper, too.
-    fn blurred(&self, dataset: &Dataset) -> Option<Finding> {
+    fn blurred(&self, dataset: &Dataset) -> Option<Diagnostic> {
         let of_all = self.sharpness().median;
         let parts: Vec<(usize, f64)> = self
             .looks
@@ -193,7 +193,7 @@ impl Gallery {
         let worst = parts.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         let frames: Vec<usize> = parts.iter().map(|(frame, _)| *frame).collect();
         Some(
-            Finding::warning(format!(
+            Diagnostic::warning(format!(
                 "{} blurred, at worst with {:.0} % of the fine detail of the frames around it ({}): {}; drop or retake \
                  them, a few blurred photos blur the whole field",
                 is_or_are(frames.len()),
@@ -206,7 +206,7 @@ impl Gallery {
     }
 
     /// Photos much brighter or darker than the others.
-    fn uneven(&self, dataset: &Dataset) -> Option<Finding> {
+    fn uneven(&self, dataset: &Dataset) -> Option<Diagnostic> {
         let stops =
             |look: &Look| look.brightness.filter(|b| *b > 0.0 && look.black < NEARLY_ALL).map(f64::log2);
         let all: Vec<f64> = self.looks.iter().filter_map(|(_, look)| stops(look)).collect();
@@ -218,7 +218,7 @@ impl Gallery {
         let worst = self.looks.iter().max_by(|a, b| off(&a.1).abs().total_cmp(&off(&b.1).abs()))?;
         (!frames.is_empty()).then(|| {
             let way = if off(&worst.1) > 0.0 { "brighter" } else { "darker" };
-            Finding::warning(format!(
+            Diagnostic::warning(format!(
                 "the exposure of {} differs from the others, at worst {} is {:.1} stops {way} than usual: {}; develop the \
                  photos with one exposure and white balance, or drop these",
                 count(frames.len(), "photo"),
@@ -231,7 +231,7 @@ impl Gallery {
     }
 
     /// The same picture under two names.
-    fn repeated(&self, dataset: &Dataset) -> Option<Finding> {
+    fn repeated(&self, dataset: &Dataset) -> Option<Diagnostic> {
         let mut first: HashMap<u64, usize> = HashMap::new();
         let mut pairs = Vec::new();
         for (index, look) in self.looks.iter().filter(|(_, look)| !look.is_flat) {
@@ -245,7 +245,7 @@ impl Gallery {
         let pose = |index: usize| dataset.frames[index].camera.world_from_camera;
         let where_to = if pose(a).abs_diff_eq(pose(b), 1e-9) { "the same pose" } else { "different poses" };
         Some(
-            Finding::warning(format!(
+            Diagnostic::warning(format!(
                 "{} the same picture as another frame: {} is {}, with {where_to}{}; drop one of each",
                 if frames.len() == 1 {
                     "1 frame shows".to_owned()

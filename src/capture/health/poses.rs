@@ -1,7 +1,7 @@
 //! Single poses that look wrong: far from the others, turned away, or given twice.
 
 use super::view_directions::ViewDirections;
-use super::{Finding, Scene, Spread};
+use super::{Diagnostic, Scene, Spread};
 use crate::camera::LensKind;
 use crate::capture::dataset::Dataset;
 use crate::support::format::{count, length};
@@ -28,7 +28,7 @@ const TURNED_AWAY: f64 = 2.0;
 const SAME: f64 = 1e-6;
 
 /// Cameras that are far from all others, or look elsewhere.
-pub(super) fn outliers(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Finding> {
+pub(super) fn outliers(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Diagnostic> {
     if scene.count() < LEAST_VIEWS {
         return Vec::new();
     }
@@ -47,7 +47,7 @@ pub(super) fn outliers(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Fi
             length(positions[first].distance(middle)),
             length(typical),
         );
-        findings.push(Finding::warning(message).about(frames));
+        findings.push(Diagnostic::warning(message).about(frames));
     }
     let jumps: Vec<usize> = jumps(&positions)
         .into_iter()
@@ -64,7 +64,7 @@ pub(super) fn outliers(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Fi
             length(step(jumps[0])),
             length(Spread::of((1..positions.len()).map(step)).median),
         );
-        findings.push(Finding::warning(message).about(frames));
+        findings.push(Diagnostic::warning(message).about(frames));
     }
     let away: Vec<usize> = away(scene, directions).into_iter().filter(|view| !far.contains(view)).collect();
     if is_few(&away, scene) {
@@ -76,7 +76,7 @@ pub(super) fn outliers(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Fi
             100.0 * directions.seeing,
             directions.off_rad[away[0]].to_degrees(),
         );
-        findings.push(Finding::warning(message).about(frames));
+        findings.push(Diagnostic::warning(message).about(frames));
     }
     findings
 }
@@ -172,7 +172,7 @@ pub(super) fn about_repeated(
     dataset: &Dataset,
     pairs: &[[usize; 2]],
     differ: Option<bool>,
-) -> Option<Finding> {
+) -> Option<Diagnostic> {
     let &[first, second] = pairs.first()?;
     let mut frames = pairs.concat();
     frames.sort_unstable();
@@ -186,13 +186,13 @@ pub(super) fn about_repeated(
         if pairs.len() > 1 { ", for example" } else { "" },
     );
     Some(match differ {
-        Some(true) => Finding::warning(format!(
+        Some(true) => Diagnostic::warning(format!(
             "{where_they_are}, and their pictures differ; unless the scene moves or the light changes, correct or drop \
              the wrong pose"
         ))
         .about(frames),
-        Some(false) => Finding::note(format!("{where_they_are}; their pictures look the same")),
-        None => Finding::note(format!(
+        Some(false) => Diagnostic::note(format!("{where_they_are}; their pictures look the same")),
+        None => Diagnostic::note(format!(
             "{where_they_are}; unless the camera stood still or the scene moves, one of the poses is wrong"
         )),
     })

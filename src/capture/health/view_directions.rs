@@ -1,6 +1,6 @@
 //! Where the cameras look: the point their axes meet in, how nearly, and from how many sides.
 
-use super::{Finding, Scene, Spread};
+use super::{Diagnostic, Scene, Spread};
 use crate::camera::orbit::Orbit;
 use crate::capture::focus::FocusKind;
 use crate::support::format::{count, length, percent};
@@ -91,10 +91,10 @@ impl ViewDirections {
         }
     }
 
-    pub(super) fn findings(&self, scene: &Scene<'_>) -> Vec<Finding> {
+    pub(super) fn findings(&self, scene: &Scene<'_>) -> Vec<Diagnostic> {
         let mut findings = Vec::new();
         if scene.count() == 1 || scene.dataset.train.len() == 1 {
-            findings.push(Finding::warning(
+            findings.push(Diagnostic::warning(
                 "there is a single image to train on: without a second view nothing tells how far away things are; \
                  add photos from other places",
             ));
@@ -104,14 +104,14 @@ impl ViewDirections {
         }
         let extent = scene.extent();
         if extent <= 1e-9 * (1.0 + self.focus.length()) {
-            findings.push(Finding::warning(format!(
+            findings.push(Diagnostic::warning(format!(
                 "all {} cameras are at the same place: nothing tells how far away things are; check that \
                  `transform_matrix` is camera-to-world, with the position in its last column, or take photos from \
                  different places",
                 scene.count()
             )));
         } else if self.meets && extent < 0.01 * self.distance.median {
-            findings.push(Finding::warning(format!(
+            findings.push(Diagnostic::warning(format!(
                 "the cameras are within {} of each other and look at a point {} away: so small a shift ({}) hardly \
                  tells distances; take photos from farther apart",
                 length(2.0 * extent),
@@ -119,7 +119,7 @@ impl ViewDirections {
                 percent(2.0 * extent / self.distance.median)
             )));
         } else if scene.focus.kind == FocusKind::Ahead && !scene.dataset.bounds.source.starts_with("stated") {
-            findings.push(Finding::note(
+            findings.push(Diagnostic::note(
                 "the optical axes do not cross, so the distance of the scene box is a guess; if the result is blurred \
                  or empty, write `aabb`: [[x, y, z], [x, y, z]], the corners of what to show, into the file",
             ));
@@ -129,7 +129,7 @@ impl ViewDirections {
     }
 
     /// Many pictures that do not stand upright, in any world direction.
-    fn rolled(&self, scene: &Scene<'_>) -> Option<Finding> {
+    fn rolled(&self, scene: &Scene<'_>) -> Option<Diagnostic> {
         let axes: Vec<_> = scene.cameras().map(|camera| camera.world_from_camera.matrix3).collect();
         // Where a camera looks up or down, its picture has no upright.
         let is_rolled = |view: usize| {
@@ -146,7 +146,7 @@ impl ViewDirections {
                 count(scene.count(), "picture"),
                 scene.names(&frames)
             );
-            Finding::note(message).about(frames)
+            Diagnostic::note(message).about(frames)
         })
     }
 }

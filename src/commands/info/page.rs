@@ -2,7 +2,8 @@
 
 use super::{Report, problems};
 use nerf::capture::dataset::Frame;
-use nerf::capture::health::{Arrangement, Severity, Spread, ViewDirections};
+use nerf::capture::diagnostics::Severity;
+use nerf::capture::health::{Arrangement, Spread, ViewDirections};
 use nerf::photo::BitDepth;
 use nerf::run::Estimate;
 use nerf::support::format::{bytes, count, length, percent, point, short};

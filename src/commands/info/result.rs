@@ -3,7 +3,8 @@
 use super::page::bits;
 use super::{Report, problems};
 use nerf::capture::dataset::Frame;
-use nerf::capture::health::{Arrangement, Finding, Severity, Spread};
+use nerf::capture::diagnostics::{Diagnostic, Severity};
+use nerf::capture::health::{Arrangement, Spread};
 use serde_json::{Value, json};
 
 impl Report<'_> {
@@ -127,7 +128,7 @@ impl Report<'_> {
         }))
     }
 
-    fn problem(&self, problem: &Finding) -> Value {
+    fn problem(&self, problem: &Diagnostic) -> Value {
         let mut value = json!({ "severity": problem.severity, "message": problem.message });
         if !problem.frames.is_empty() {
             value["frames"] = json!(self.names(&problem.frames));

@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use glam::DVec2;
 
 use crate::capture::dataset::json::{Fields, REMEDY};
-use crate::capture::dataset::notes::{Note, Severity};
+use crate::capture::diagnostics::{Diagnostic, Severity};
 
 /// Width and height in pixels as far as they are known; may be fractional.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -86,7 +86,7 @@ pub(super) struct Measure {
 
 impl Measure {
     /// The length in pixels of an image of this size, and what is to be said where that differs.
-    pub(super) fn at(self, actual: DVec2) -> (DVec2, Option<Note>) {
+    pub(super) fn at(self, actual: DVec2) -> (DVec2, Option<Diagnostic>) {
         let Some(size) = self.size.beside(actual) else {
             return (self.px, None);
         };
@@ -118,7 +118,7 @@ impl Measure {
 }
 
 impl Origin {
-    fn remark(self, from: DVec2, actual: DVec2) -> Note {
+    fn remark(self, from: DVec2, actual: DVec2) -> Diagnostic {
         let ratio = actual / from;
         let source = match self {
             Self::Declared => "the file's intrinsics belong to",
@@ -139,7 +139,7 @@ impl Origin {
                 "; the aspect ratios differ, so the image may be cropped or rotated and the cameras wrong"
             };
         }
-        Note { severity, message, remedy: None }
+        Diagnostic::new(severity, message)
     }
 }
 

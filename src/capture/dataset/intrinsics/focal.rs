@@ -7,7 +7,8 @@ use glam::DVec2;
 
 use super::extent::Measure;
 use crate::capture::dataset::json::{Fields, REMEDY};
-use crate::capture::dataset::notes::{Notes, Severity};
+use crate::capture::dataset::notes::Notes;
+use crate::capture::diagnostics::Severity;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Focal {

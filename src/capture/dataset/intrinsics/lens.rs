@@ -4,7 +4,8 @@ use anyhow::{Result, bail, ensure};
 
 use crate::camera::Lens;
 use crate::capture::dataset::json::{Fields, shortened};
-use crate::capture::dataset::notes::{Notes, Severity};
+use crate::capture::dataset::notes::Notes;
+use crate::capture::diagnostics::Severity;
 
 /// What one object of a file says about the lens.
 #[derive(Clone, Debug, Default)]

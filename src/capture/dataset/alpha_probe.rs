@@ -4,9 +4,10 @@ use anyhow::Result;
 use rayon::prelude::*;
 
 use super::Frame;
-use super::notes::{Notes, Severity};
+use super::notes::Notes;
 use super::photo::How;
 use super::splits::evenly_spaced;
+use crate::capture::diagnostics::Severity;
 use crate::capture::image::{Evidence, Multiplied};
 use crate::capture::scene_box::Surroundings;
 use crate::photo::BitDepth;
@@ -16,8 +17,8 @@ use crate::support::remedy::{Advised, Remedy};
 /// Images that are looked at to tell what their alpha means.
 const MOST: usize = 4;
 
-/// The frames that samples are taken from.
-pub(super) struct Samples<'a> {
+/// The frames whose images are looked at.
+pub(super) struct AlphaProbe<'a> {
     /// To train on, or all if there are none; never empty.
     pub(super) frames: Vec<&'a Frame>,
     pub(super) bits: BitDepth,
@@ -25,7 +26,7 @@ pub(super) struct Samples<'a> {
     pub(super) skips_damaged: bool,
 }
 
-impl Samples<'_> {
+impl AlphaProbe<'_> {
     /// What alpha means: as asked, or as a few of the images show.
     pub(super) fn alpha(&self, reading: &Reading, notes: &mut Notes) -> Result<AlphaMode> {
         if reading.alpha != AlphaMode::Auto {
@@ -35,14 +36,14 @@ impl Samples<'_> {
             return Ok(AlphaMode::Premultiplied);
         }
         let with_alpha: Vec<_> = self.frames.iter().filter(|frame| frame.has_own_alpha).collect();
-        let samples = evenly_spaced(&with_alpha, MOST);
+        let probed = evenly_spaced(&with_alpha, MOST);
         let how = How { multiplied: Multiplied::Straight, ..How::new(self.bits, reading) };
         let look = |frame: &&&Frame| match frame.upright(how) {
             Ok(image) => Ok(image.evidence()),
             Err(_) if self.skips_damaged => Ok(Evidence::default()),
             Err(error) => Err(error),
         };
-        let evidence: Vec<Evidence> = samples.par_iter().map(look).collect::<Result<_>>()?;
+        let evidence: Vec<Evidence> = probed.par_iter().map(look).collect::<Result<_>>()?;
         if !evidence.into_iter().fold(Evidence::default(), Evidence::and).is_premultiplied() {
             return Ok(AlphaMode::Straight);
         }

@@ -7,7 +7,7 @@ use std::thread;
 use anyhow::{Result, bail};
 
 /// Most bytes of all things that are being made or wait to be handed over, unless a single one takes more.
-pub(super) const LOOK_AHEAD_BYTES: u64 = 1 << 30;
+pub(super) const PREFETCH_BYTES: u64 = 1 << 30;
 
 /// Most things at a time: one for each thread that makes them, and the one that was handed over.
 fn most_at_a_time() -> usize {
@@ -17,39 +17,41 @@ fn most_at_a_time() -> usize {
 /// Most bytes at a time, where things take up to `largest` bytes each.
 pub(super) fn most_bytes(count: usize, largest: u64) -> u64 {
     let all = largest.saturating_mul(count.min(most_at_a_time()) as u64);
-    all.min(LOOK_AHEAD_BYTES.max(largest))
+    all.min(PREFETCH_BYTES.max(largest))
 }
 
 /// Makes the things number 0 to `bytes.len() - 1`, which take so many bytes each, on as many threads as rayon
 /// has, and hands them to `take` in their order, on this thread. Stops at the first failure, of either.
-pub(super) fn ordered<T: Send>(
+pub(super) fn prefetch<T: Send>(
     bytes: &[u64],
     make: &(dyn Fn(usize) -> Result<T> + Sync),
     take: &mut dyn FnMut(usize, T) -> Result<()>,
 ) -> Result<()> {
-    let line = Line { bytes, state: Mutex::new(State::default()), changed: Condvar::new() };
+    let pipeline = Pipeline { bytes, state: Mutex::new(Queue::default()), changed: Condvar::new() };
     thread::scope(|scope| {
         for _ in 0..rayon::current_num_threads().min(bytes.len()) {
-            scope.spawn(|| line.work(make));
+            scope.spawn(|| pipeline.work(make));
         }
         // Whatever happens here, the threads are to end.
-        let _stop = Stop(&line);
+        let _stop = Stop(&pipeline);
         for number in 0..bytes.len() {
-            let Some(made) = line.wait_for(number) else { bail!("decoding was interrupted by a failure") };
+            let Some(made) = pipeline.wait_for(number) else {
+                bail!("decoding was interrupted by a failure")
+            };
             take(number, made?)?;
-            line.release(number);
+            pipeline.release(number);
         }
         Ok(())
     })
 }
 
-struct Line<'a, T> {
+struct Pipeline<'a, T> {
     bytes: &'a [u64],
-    state: Mutex<State<T>>,
+    state: Mutex<Queue<T>>,
     changed: Condvar,
 }
 
-struct State<T> {
+struct Queue<T> {
     /// Number of the next thing to make.
     next: usize,
     /// Bytes and number of the things begun and not yet released.
@@ -59,14 +61,14 @@ struct State<T> {
     is_stopped: bool,
 }
 
-impl<T> Default for State<T> {
+impl<T> Default for Queue<T> {
     fn default() -> Self {
         Self { next: 0, held_bytes: 0, held: 0, made: BTreeMap::new(), is_stopped: false }
     }
 }
 
 /// Stops everything when dropped, also by a panic: nobody is left waiting.
-struct Stop<'a, 'b, T>(&'a Line<'b, T>);
+struct Stop<'a, 'b, T>(&'a Pipeline<'b, T>);
 
 impl<T> Drop for Stop<'_, '_, T> {
     fn drop(&mut self) {
@@ -75,13 +77,13 @@ impl<T> Drop for Stop<'_, '_, T> {
     }
 }
 
-impl<T> Line<'_, T> {
-    fn lock(&self) -> MutexGuard<'_, State<T>> {
+impl<T> Pipeline<'_, T> {
+    fn lock(&self) -> MutexGuard<'_, Queue<T>> {
         // The state is changed in single assignments, and is good even if somebody panicked.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn wait<'s>(&self, state: MutexGuard<'s, State<T>>) -> MutexGuard<'s, State<T>> {
+    fn wait<'s>(&self, state: MutexGuard<'s, Queue<T>>) -> MutexGuard<'s, Queue<T>> {
         self.changed.wait(state).unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -106,7 +108,7 @@ impl<T> Line<'_, T> {
         loop {
             let number = state.next;
             let &bytes = self.bytes.get(number).filter(|_| !state.is_stopped)?;
-            let fits = state.held < most_at_a_time() && state.held_bytes + bytes <= LOOK_AHEAD_BYTES;
+            let fits = state.held < most_at_a_time() && state.held_bytes + bytes <= PREFETCH_BYTES;
             if state.held == 0 || fits {
                 state.next += 1;
                 state.held += 1;
@@ -178,7 +180,7 @@ mod tests {
             thread::sleep(Duration::from_micros(200 * (count - number) as u64 % 1000));
             Ok(Thing::new(number, &census))
         };
-        ordered(&vec![bytes; count], &make, &mut |number, thing| {
+        prefetch(&vec![bytes; count], &make, &mut |number, thing| {
             assert_eq!((number, thing.0), (next, next));
             next += 1;
             Ok(())
@@ -191,27 +193,27 @@ mod tests {
     #[test]
     fn things_come_in_order_and_few_at_a_time() {
         assert!(most_alive(50, 1) <= most_at_a_time());
-        assert_eq!(most_alive(9, LOOK_AHEAD_BYTES), 1, "as many as fit");
-        assert_eq!(most_alive(5, 3 * LOOK_AHEAD_BYTES), 1, "one that does not fit is alone");
-        assert!(most_alive(20, LOOK_AHEAD_BYTES / 2) <= 2);
+        assert_eq!(most_alive(9, PREFETCH_BYTES), 1, "as many as fit");
+        assert_eq!(most_alive(5, 3 * PREFETCH_BYTES), 1, "one that does not fit is alone");
+        assert!(most_alive(20, PREFETCH_BYTES / 2) <= 2);
         assert_eq!(most_alive(0, 1), 0);
         assert_eq!(most_bytes(100, 10), 10 * most_at_a_time() as u64);
         assert_eq!(most_bytes(1, 10), 10);
-        assert_eq!(most_bytes(9, 2 * LOOK_AHEAD_BYTES), 2 * LOOK_AHEAD_BYTES);
+        assert_eq!(most_bytes(9, 2 * PREFETCH_BYTES), 2 * PREFETCH_BYTES);
     }
 
     #[test]
     fn failures_end_it_at_their_place() {
         let make = |number: usize| if number == 7 { bail!("seven") } else { Ok(number) };
         let mut taken = Vec::new();
-        let failed = ordered(&[1; 30], &make, &mut |_, number| {
+        let failed = prefetch(&[1; 30], &make, &mut |_, number| {
             taken.push(number);
             Ok(())
         });
         assert_eq!(failed.expect_err("fails").to_string(), "seven");
         assert_eq!(taken, (0..7).collect::<Vec<_>>());
         let failed =
-            ordered(&[1; 30], &|n| Ok(n), &mut |n, _: usize| if n == 3 { bail!("taker") } else { Ok(()) });
+            prefetch(&[1; 30], &|n| Ok(n), &mut |n, _: usize| if n == 3 { bail!("taker") } else { Ok(()) });
         assert_eq!(failed.expect_err("fails").to_string(), "taker");
     }
 
@@ -222,7 +224,7 @@ mod tests {
                 assert!(number != 2, "as if a decoder panicked");
                 Ok(number)
             };
-            ordered(&[1; 30], &make, &mut |_, _| Ok(()))
+            prefetch(&[1; 30], &make, &mut |_, _| Ok(()))
         });
         assert!(attempt.is_err());
     }

@@ -7,11 +7,12 @@ use anyhow::{Context, Result, ensure};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::listing::{Entry, Listing};
-use super::notes::{Notes, Severity};
+use super::listing::{FrameEntry, Listing};
+use super::notes::Notes;
 use super::photo::Source;
 use super::sidecars::{Finder, Sidecars};
 use super::{Frame, OpenOptions, Split, frames};
+use crate::capture::diagnostics::Severity;
 use crate::capture::image::Turn;
 use crate::capture::image::{FORMATS, Header};
 use crate::photo::BitDepth;
@@ -20,8 +21,8 @@ use crate::support::format::few;
 use crate::support::remedy::{Advised, Remedy};
 
 /// A listed frame and what was found of it.
-pub(super) struct Located {
-    entry: Entry,
+pub(super) struct ResolvedFrame {
+    entry: FrameEntry,
     found: Option<(PathBuf, Header)>,
     /// Why the image, which is there, is not found.
     damage: Option<String>,
@@ -33,7 +34,7 @@ pub(super) struct Present {
     pub(super) listed: usize,
     /// Names of those that are missing.
     pub(super) missing: Vec<String>,
-    located: Vec<Located>,
+    resolved: Vec<ResolvedFrame>,
     damaged: Vec<String>,
 }
 
@@ -55,7 +56,7 @@ pub(super) fn locate(
     root: &Path,
     allow_damaged: bool,
     notes: &mut Notes,
-) -> Result<Vec<Located>> {
+) -> Result<Vec<ResolvedFrame>> {
     notes.append(listing.notes);
     if listing.frames.iter().any(|entry| entry.split.is_some()) {
         listing.frames.retain(|entry| entry.split.is_some());
@@ -74,12 +75,12 @@ pub(super) fn locate(
             paths.push((entry, path));
         }
     }
-    let inspect = |(entry, path): (Entry, Option<PathBuf>)| {
+    let inspect = |(entry, path): (FrameEntry, Option<PathBuf>)| {
         let header = path.as_deref().map(Header::read).transpose();
         match header.with_context(|| entry.label.clone()) {
-            Ok(header) => Ok(Located { entry, found: path.zip(header), damage: None }),
+            Ok(header) => Ok(ResolvedFrame { entry, found: path.zip(header), damage: None }),
             Err(error) if allow_damaged => {
-                Ok(Located { entry, found: None, damage: Some(format!("{error:#}")) })
+                Ok(ResolvedFrame { entry, found: None, damage: Some(format!("{error:#}")) })
             }
             Err(error) => Err(error),
         }
@@ -94,18 +95,18 @@ fn canonical(path: &Path) -> PathBuf {
 impl Present {
     /// Sets missing and damaged frames aside.
     pub(super) fn new(
-        located: Vec<Located>,
+        resolved: Vec<ResolvedFrame>,
         root: &Path,
         options: &OpenOptions,
         notes: &mut Notes,
     ) -> Result<Self> {
-        let listed = located.len();
-        let names = |holds: fn(&Located) -> bool| -> Vec<String> {
-            located.iter().filter(|frame| holds(frame)).map(|frame| frame.entry.file_path.clone()).collect()
+        let listed = resolved.len();
+        let names = |holds: fn(&ResolvedFrame) -> bool| -> Vec<String> {
+            resolved.iter().filter(|frame| holds(frame)).map(|frame| frame.entry.file_path.clone()).collect()
         };
         let missing = names(|frame| frame.found.is_none());
         let nowhere = names(|frame| frame.found.is_none() && frame.damage.is_none());
-        let damaged = located.iter().filter_map(|frame| frame.damage.clone()).collect();
+        let damaged = resolved.iter().filter_map(|frame| frame.damage.clone()).collect();
         if !nowhere.is_empty() {
             let message = format!(
                 "{} of {listed} listed images are missing in {}: {}",
@@ -121,13 +122,13 @@ impl Present {
             }
         }
         let is_any_found = missing.len() < listed;
-        let located = located.into_iter().filter(|frame| frame.found.is_some() || !is_any_found).collect();
-        Ok(Self { listed, missing, located, damaged })
+        let resolved = resolved.into_iter().filter(|frame| frame.found.is_some() || !is_any_found).collect();
+        Ok(Self { listed, missing, resolved, damaged })
     }
 
     /// The depth of the finest images; display-referred and linear ones do not mix.
     pub(super) fn bit_depth(&self, notes: &mut Notes) -> Result<BitDepth> {
-        let found = || self.located.iter().filter_map(|frame| frame.found.as_ref());
+        let found = || self.resolved.iter().filter_map(|frame| frame.found.as_ref());
         let first = |bits: BitDepth| found().find(|(_, header)| header.bits == bits);
         let finest = found().map(|(_, header)| header.bits).max().unwrap_or(BitDepth::Eight);
         let coarsest = found().map(|(_, header)| header.bits).min().unwrap_or(BitDepth::Eight);
@@ -151,10 +152,10 @@ impl Present {
         let reading = &options.reading;
         let mut damaged = self.damaged;
         let mut finder = Finder::new(root);
-        let is_any_found = self.located.iter().any(|frame| frame.found.is_some());
+        let is_any_found = self.resolved.iter().any(|frame| frame.found.is_some());
         let mut members = Vec::new();
         let mut frames = Vec::new();
-        for Located { entry, found, .. } in self.located {
+        for ResolvedFrame { entry, found, .. } in self.resolved {
             let frame = match found {
                 Some((path, header)) => {
                     let mut sidecars = finder.find(&entry, &path, notes);
@@ -192,7 +193,7 @@ fn remark_on_masks(frames: &[Frame], finder: &Finder, inverts: bool, notes: &mut
 
 /// A frame whose image was found.
 fn frame(
-    entry: &Entry,
+    entry: &FrameEntry,
     (path, header): (PathBuf, Header),
     sidecars: Sidecars,
     reading: &Reading,
@@ -228,7 +229,7 @@ fn frame(
 }
 
 /// A frame without an image, of the size that the file declares.
-fn absent(entry: &Entry, reading: &Reading, notes: &mut Notes) -> Result<Frame> {
+fn absent(entry: &FrameEntry, reading: &Reading, notes: &mut Notes) -> Result<Frame> {
     let size = entry.declared_size().unwrap_or_else(|| {
         let message = "neither an image nor `w` and `h` tell the size; 800x800 is assumed";
         notes.frame(Severity::Warning, &entry.label, message);
@@ -243,7 +244,7 @@ fn absent(entry: &Entry, reading: &Reading, notes: &mut Notes) -> Result<Frame> 
 /// Whether and how an image is turned. Structure from motion takes pixels as they are stored, whatever a
 /// photo's metadata tells viewers to do, so poses belong to the stored pixels, unless the size that the dataset
 /// declares says that they do not.
-fn turn(entry: &Entry, header: &Header, notes: &mut Notes) -> Option<Turn> {
+fn turn(entry: &FrameEntry, header: &Header, notes: &mut Notes) -> Option<Turn> {
     let orientation = header.orientation?;
     let stored = DVec2::new(f64::from(header.width), f64::from(header.height));
     let fits = |size: DVec2| {
