@@ -2,11 +2,11 @@
 
 mod cli;
 mod commands;
+mod console;
 mod flags;
 mod narrator;
 mod outcome;
 mod progress;
-mod remarks;
 
 use clap::Parser;
 use std::io::{ErrorKind, Write};

@@ -18,7 +18,7 @@ pub(super) fn run(args: &Check, session: &Session<'_>) -> Result<()> {
     let adapter = CheckedAdapter::new(&gpu, forced(args))?;
     let heading = format!("adapter  {}\npath     {}", gpu.info.name, adapter.describe()?);
     if session.global.json {
-        session.remarks.say(&heading);
+        session.console.say(&heading);
     }
     match (&args.vectors, &file) {
         (Some(path), Some(file)) => rays(&adapter, file, path, &heading, session),
@@ -38,7 +38,7 @@ fn forced(args: &Check) -> Forced {
 /// Checks all kernels and prints the table.
 fn kernels(adapter: &CheckedAdapter, heading: &str, session: &Session<'_>) -> Result<()> {
     let start = Instant::now();
-    let progress = Progress::new(session.remarks, "checking");
+    let progress = Progress::new(session.console, "checking");
     let results = check::run(adapter, &|done, all, name| {
         progress.update(done as f64 / all as f64, || format!("{name} ({} of {all})", done + 1));
     })?;

@@ -33,7 +33,7 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     evaluator.background = args.background.color();
     let scores = measure(evaluator, &indices, args, session)?;
     let means = Means::of(&scores).context("there was nothing to measure")?;
-    session.remarks.fog(means.near_share);
+    session.console.fog(means.near_share);
     session.print(&report(args, &field, &scores, means), &describe(args, &scores, means, field.color_space()))
 }
 
@@ -73,7 +73,7 @@ fn frames(
             "there are no {} views, neither in the checkpoint nor in the dataset",
             split.name()
         );
-        session.remarks.warn(&format!(
+        session.console.warn(&format!(
             "none of the {} {} views of the training is in this dataset; its own {} are measured",
             names.len(),
             split.name(),
@@ -82,7 +82,7 @@ fn frames(
         return Ok(indices);
     }
     if !missing.is_empty() {
-        session.remarks.warn(&format!(
+        session.console.warn(&format!(
             "{} of {} {} views of the training are missing in this dataset: {}",
             missing.len(),
             names.len(),

@@ -23,7 +23,7 @@ pub(super) fn run(args: &Generate, session: &Session<'_>) -> Result<()> {
         seed: args.seed,
         ..scene::Generate::new(name)
     };
-    let progress = Progress::new(session.remarks, "generating");
+    let progress = Progress::new(session.console, "generating");
     let total = options.views.total();
     let summary = scene::generate(&options, out, &|done| progress.count(done, total, "views"))?;
     drop(progress);

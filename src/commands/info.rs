@@ -93,7 +93,7 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
 
 /// Decodes all photos, in parallel, and keeps what matters of each.
 fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, Vec<Diagnostic>) {
-    let progress = Progress::new(session.remarks, "looking");
+    let progress = Progress::new(session.console, "looking");
     let done = AtomicUsize::new(0);
     let looks: Vec<_> = (views.par_iter())
         .map(|&index| {

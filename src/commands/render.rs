@@ -47,7 +47,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     let mut renderer = field.renderer(&gpu, &lenses)?;
     let depth_range = depth_range(&field.metadata().bounds, &jobs);
     let writer = Writer { args, color_space: field.color_space(), depth_range };
-    let progress = Progress::new(session.remarks, "rendering");
+    let progress = Progress::new(session.console, "rendering");
     let (frames, seconds) = render_and_write(&mut renderer, &jobs, &writer, &progress)?;
     drop(progress);
     let mut listing =

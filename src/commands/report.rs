@@ -31,7 +31,7 @@ pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
         (Facts { run, settings: folder.config(), ..Facts::default() }, Err(reason))
     };
     if let Err(reason) = &views {
-        session.remarks.warn(reason);
+        session.console.warn(reason);
     }
     let out = args.out.clone().unwrap_or_else(|| folder.report());
     let report = Report { facts, log, views };
@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
     outcome::add(&mut result, outcome.as_ref());
     // What the log tells of them is no part of the page's pictures.
     result["views"] = json!(report.views.as_ref().map_or(0, TestViews::count));
-    session.remarks.fog(outcome.and_then(|outcome| outcome.near_share));
+    session.console.fog(outcome.and_then(|outcome| outcome.near_share));
     session.print(&result, &text)
 }
 

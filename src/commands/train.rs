@@ -63,11 +63,11 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         if outcome.left_out > 0 {
             text += &format!("; `nerf eval {folder} {}` measures all test views", args.dataset.display());
         }
-        session.remarks.fog(outcome.near_share);
+        session.console.fog(outcome.near_share);
     }
     match report {
         Ok(page) => result["report"] = json!(page.display().to_string()),
-        Err(error) => session.remarks.warn(&format!("the training is saved, but {}", told(&error))),
+        Err(error) => session.console.warn(&format!("the training is saved, but {}", told(&error))),
     }
     session.print(&result, &text)
 }
@@ -88,10 +88,10 @@ fn open(args: &Train, checkpoint: Option<&Checkpoint>, session: &Session<'_>) ->
     let reading = args.reading.over(earlier.unwrap_or_default());
     let options = OpenOptions { hold_out: args.hold_out, reading, ..OpenOptions::default() };
     let dataset = Dataset::open(&args.dataset, &options)?;
-    session.remarks.notes(&dataset);
+    session.console.notes(&dataset);
     let findings = Survey::of(&dataset).findings;
     for finding in findings.iter().filter(|finding| finding.severity < Severity::Note) {
-        session.remarks.warn(&spoken(&finding.message, finding.remedy.as_ref()));
+        session.console.warn(&spoken(&finding.message, finding.remedy.as_ref()));
     }
     Ok(dataset)
 }

@@ -1,8 +1,8 @@
 //! One training, measured at times that are evenly spaced on a logarithmic axis.
 
+use crate::console::Console;
 use crate::narrator::Narrator;
 use crate::progress::{Progress, duration};
-use crate::remarks::Remarks;
 use anyhow::{Context, Result};
 use nerf::config::schedule::Budget;
 use nerf::run::log::Stage;
@@ -75,9 +75,9 @@ pub(super) fn follow(
     mut stepper: Stepper,
     evaluator: &mut Evaluator<'_>,
     test: &[usize],
-    remarks: Remarks,
+    console: Console,
 ) -> Result<Curve> {
-    let progress = Progress::new(remarks, "training");
+    let progress = Progress::new(console, "training");
     let (mut points, mut samples) = (Vec::<Point>::new(), 0);
     let (mut next_mark, mut next_loss) = (FIRST, 0.0);
     let mut loss = None;
@@ -105,7 +105,7 @@ pub(super) fn follow(
     }
     drop(progress);
     let (step, seconds) = (stepper.steps(), stepper.seconds());
-    let scores = evaluator.all(test, &mut Narrator::new(remarks))?.context("there are no test views")?;
+    let scores = evaluator.all(test, &mut Narrator::new(console))?.context("there are no test views")?;
     points.pop_if(|last| last.step == step);
     // The few once more, for the curve, and all of them.
     let few = scores.few.filter(|few| few.views < scores.all.views);

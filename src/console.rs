@@ -1,4 +1,4 @@
-//! Remarks on stderr.
+//! Console on stderr.
 
 use crate::cli::Global;
 use crate::flags::spoken;
@@ -7,15 +7,15 @@ use nerf::capture::diagnostics::Severity;
 use nerf::run::depths::fog;
 use std::io::Write;
 
-/// Prints remarks as far as they are wanted.
+/// Prints messages, as far as the command line asks for them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Remarks {
+pub(crate) struct Console {
     /// Nothing at all.
     pub(crate) quiet: bool,
     verbose: bool,
 }
 
-impl Remarks {
+impl Console {
     /// What the command line asks for.
     pub(crate) fn new(global: &Global) -> Self {
         Self { quiet: global.quiet, verbose: global.verbose > 0 }
