@@ -5,7 +5,7 @@ pub(crate) mod check;
 pub(crate) mod generate;
 pub(crate) mod info;
 mod one_of;
-pub(crate) mod reading;
+pub(crate) mod photo_flags;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::capture::dataset::HoldOut;
@@ -126,7 +126,7 @@ pub(crate) struct Train {
     pub(crate) eval_all: bool,
     /// How photos are read.
     #[command(flatten)]
-    pub(crate) reading: reading::Reading,
+    pub(crate) reading: photo_flags::PhotoFlags,
 }
 
 /// `nerf render`
@@ -195,7 +195,7 @@ pub(crate) struct Eval {
     pub(crate) save: Option<PathBuf>,
     /// How photos are read.
     #[command(flatten)]
-    pub(crate) reading: reading::Reading,
+    pub(crate) reading: photo_flags::PhotoFlags,
 }
 
 /// `nerf report`
@@ -211,7 +211,7 @@ pub(crate) struct Report {
     pub(crate) out: Option<PathBuf>,
     /// How photos are read.
     #[command(flatten)]
-    pub(crate) reading: reading::Reading,
+    pub(crate) reading: photo_flags::PhotoFlags,
 }
 
 /// A file format to render to.

@@ -10,7 +10,7 @@ mod render;
 mod report;
 mod train;
 
-use crate::cli::reading::Reading;
+use crate::cli::photo_flags::PhotoFlags;
 use crate::cli::{Cli, Command, Global};
 use crate::console::Console;
 use crate::narrator::Narrator;
@@ -100,7 +100,7 @@ impl Session<'_> {
 }
 
 /// Opens a dataset to compare a field with: the photos are read as the command line says, else as for the training.
-fn open_to_compare(path: &Path, reading: &Reading, metadata: &Metadata) -> Result<Dataset> {
+fn open_to_compare(path: &Path, reading: &PhotoFlags, metadata: &Metadata) -> Result<Dataset> {
     let reading = reading.over(metadata.reading.clone());
     Dataset::open(path, &OpenOptions { reading, ..OpenOptions::default() })
 }

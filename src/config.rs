@@ -189,14 +189,14 @@ pub enum Background {
     Color([f32; 3]),
 }
 
-/// The two sums of optical depth.
+/// Which optical depths the transmittance `T_i` of a sample sums up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Transmittance {
-    /// Before the sample.
+    /// `T_i = exp(−Σ_{j<i} τ_j)`, the light that reaches the sample (Mildenhall et al. 2020, eq. 3).
     #[default]
     Exclusive,
-    /// Up to and including the sample.
+    /// `T_i = exp(−Σ_{j≤i} τ_j)`, the light that leaves the sample, as Perlman 2023 prints it.
     Inclusive,
 }
 

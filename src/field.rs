@@ -33,7 +33,7 @@ pub use constants::{RELATIVE_FLOOR, STEP_GROWTH, STEP_SHRINKAGE, dimension};
 pub use features::SceneFeatures;
 pub use link::Link;
 pub use plan::Plan;
-pub use shared::{Camera, Counters, LAYOUTS, Progress, RayResult, RayTarget, Step, Tile};
+pub use shared::{Counters, DeviceCamera, LAYOUTS, Progress, RayResult, RayTarget, Step, Tile};
 pub use space::Space;
 pub use stages::{backward, color, composite, density, march, occupancy, optimize, rays, viewing};
 pub use workspace::Workspace;

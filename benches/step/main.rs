@@ -199,10 +199,10 @@ fn say(text: &str) {
 
 fn generate(folder: &Path) -> Result<PathBuf> {
     say("generating the scene toys");
-    let options = scene::Generate {
-        views: scene::Views::of_total(100)?,
+    let options = scene::SceneOptions {
+        views: scene::ViewCounts::of_total(100)?,
         size: (100, 100),
-        ..scene::Generate::new("toys")
+        ..scene::SceneOptions::new("toys")
     };
     scene::generate(&options, folder, &|_| {})?;
     Ok(folder.to_owned())

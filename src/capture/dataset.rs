@@ -92,7 +92,7 @@ pub struct Frame {
     pub has_depth: bool,
     /// Whether the alpha is in the image file.
     has_own_alpha: bool,
-    source: photo::Source,
+    source: photo::PhotoSource,
 }
 
 /// Choices when opening a dataset.

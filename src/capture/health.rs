@@ -45,7 +45,7 @@ impl Survey {
     /// Looks at all frames of a dataset, of which there is at least one.
     #[must_use]
     pub fn of(dataset: &Dataset) -> Self {
-        let scene = Scene::new(dataset);
+        let scene = CameraSet::new(dataset);
         let directions = ViewDirections::of(&scene);
         let coverage = Coverage::of(&scene);
         let optics = Optics::of(&scene);
@@ -80,7 +80,7 @@ impl Survey {
 }
 
 /// The dataset as its examinations see it.
-struct Scene<'a> {
+struct CameraSet<'a> {
     dataset: &'a Dataset,
     /// Indices of the frames, each image once.
     views: Vec<usize>,
@@ -89,7 +89,7 @@ struct Scene<'a> {
     focus: Focus,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> CameraSet<'a> {
     fn new(dataset: &'a Dataset) -> Self {
         let views = dataset.distinct_images();
         let axes: Vec<OpticalAxis> =

@@ -18,7 +18,7 @@ use anyhow::{Context, Result, ensure};
 use crate::photo::{BitDepth, Image, Pixels};
 use crate::support::file::write_atomically;
 pub(crate) use alpha::{Evidence, Multiplied};
-use decode::Kind;
+use decode::FileFormat;
 pub use depth::{DepthMap, load_depth};
 pub use grid::{Turn, Window};
 pub(crate) use grid::{crop, nearest};
@@ -58,9 +58,9 @@ impl Image {
     /// When the file cannot be read, is damaged, incomplete or of another format, or has more than
     /// [`MOST_PIXELS`]; the message names the file.
     pub fn load(path: &Path) -> Result<Self> {
-        let load = || match Kind::detect(path)? {
-            Kind::OpenExr => open_exr::load(path),
-            Kind::Common(format) => decode::load(path, format),
+        let load = || match FileFormat::detect(path)? {
+            FileFormat::OpenExr => open_exr::load(path),
+            FileFormat::Common(format) => decode::load(path, format),
         };
         of_file(path, load)
     }
@@ -93,9 +93,9 @@ impl Header {
     /// # Errors
     /// As [`Image::load`].
     pub fn read(path: &Path) -> Result<Self> {
-        let read = || match Kind::detect(path)? {
-            Kind::OpenExr => open_exr::header(path),
-            Kind::Common(format) => decode::header(path, format),
+        let read = || match FileFormat::detect(path)? {
+            FileFormat::OpenExr => open_exr::header(path),
+            FileFormat::Common(format) => decode::header(path, format),
         };
         of_file(path, read)
     }

@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// All there is to say about a dataset.
 #[derive(Debug)]
-struct Report<'a> {
+struct Preflight<'a> {
     args: &'a Info,
     dataset: &'a Dataset,
     survey: Survey,
@@ -66,7 +66,7 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
 }
 
 /// Looks at cameras, photos and memory.
-fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> Result<Report<'a>> {
+fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> Result<Preflight<'a>> {
     let survey = Survey::of(dataset);
     let mut problems = problems::of_dataset(dataset);
     problems.extend(survey.findings.iter().cloned());
@@ -88,7 +88,7 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
         problems.extend(problems::of_memory(&estimate));
         memory = Some(estimate);
     }
-    Ok(Report { args, dataset, survey, gallery, memory, problems })
+    Ok(Preflight { args, dataset, survey, gallery, memory, problems })
 }
 
 /// Decodes all photos, in parallel, and keeps what matters of each.

@@ -70,7 +70,7 @@ pub struct Metadata {
     /// How the photos were read.
     pub reading: Reading,
     /// Which frames were trained on, and which were not.
-    pub splits: Splits,
+    pub splits: SplitNames,
     /// Median width and height of the training images, in pixels.
     pub image_size: [u32; 2],
     /// Whether the training images have transparent pixels.
@@ -82,7 +82,7 @@ pub struct Metadata {
 /// Names of the frames of each split.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Splits {
+pub struct SplitNames {
     /// Trained on.
     pub train: Vec<String>,
     /// Set aside to choose settings by.
@@ -91,7 +91,7 @@ pub struct Splits {
     pub test: Vec<String>,
 }
 
-impl Splits {
+impl SplitNames {
     /// The names of one split.
     #[must_use]
     pub fn names(&self, split: Split) -> &[String] {
@@ -281,7 +281,7 @@ mod tests {
             bounds,
             features,
             reading: Reading { downscale: 2, ..Reading::default() },
-            splits: Splits { train: vec!["a".into()], ..Splits::default() },
+            splits: SplitNames { train: vec!["a".into()], ..SplitNames::default() },
             image_size: [30, 20],
             has_alpha: true,
             orbit: Orbit::of(&[], DVec3::ZERO),

@@ -8,13 +8,13 @@ use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::tensor::Element;
 
 /// A group of parameters.
-pub struct Group {
+pub struct ParameterGroup {
     /// What kernels and checkpoints call it.
     pub name: &'static str,
-    place: Place,
+    place: ArrayStorage,
     /// The shape of its numbers.
     shape: fn(&Plan) -> Vec<usize>,
-    start: Start,
+    start: InitialValue,
     /// Whether rendering reads it.
     rendered: bool,
     /// How Adam learns it; `None` for what is measured instead.
@@ -28,9 +28,9 @@ pub struct Learning {
     /// Its L2 regularisation.
     pub l2: fn(&Optimizer) -> f64,
     /// The numbers that Adam keeps of it: what they are called, where they are, and how many there are per parameter.
-    moments: &'static [(&'static str, Place, usize)],
+    moments: &'static [(&'static str, ArrayStorage, usize)],
     /// Its kernel.
-    pub kernel: Kernel,
+    pub kernel: AdamKernel,
 }
 
 impl Learning {
@@ -45,7 +45,7 @@ impl Learning {
 
 /// A kernel of Adam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kernel {
+pub enum AdamKernel {
     /// `adam_table.wgsl`: leaves alone what no gradient touched.
     Table,
     /// `adam_dense.wgsl`: all, from the gradients in the buffer of this name, with two arrays of moments.
@@ -54,7 +54,7 @@ pub enum Kernel {
 
 /// Where the numbers of an array are on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Place {
+enum ArrayStorage {
     /// In a tensor.
     Tensor(Element),
     /// In a buffer that kernels read as uniform.
@@ -65,7 +65,7 @@ enum Place {
 
 /// What an array holds before the first step.
 #[derive(Clone, Copy)]
-enum Start {
+enum InitialValue {
     /// Zeros.
     Zeros,
     /// Numbers drawn from a seed.
@@ -75,47 +75,47 @@ enum Start {
 }
 
 /// The table.
-pub static GROUPS: &[Group] = &[
-    Group {
+pub static GROUPS: &[ParameterGroup] = &[
+    ParameterGroup {
         name: "table",
-        place: Place::Tensor(Element::Vec2),
+        place: ArrayStorage::Tensor(Element::Vec2),
         shape: |plan| vec![plan.layout.entries, FEATURES],
-        start: Start::Drawn(Layout::initial_table),
+        start: InitialValue::Drawn(Layout::initial_table),
         rendered: true,
         learning: Some(Learning {
             rate: 1.0,
             l2: |_| 0.0,
             // The first of both features, then the second.
-            moments: &[("table_moments", Place::Tensor(Element::Vec4), 2)],
-            kernel: Kernel::Table,
+            moments: &[("table_moments", ArrayStorage::Tensor(Element::Vec4), 2)],
+            kernel: AdamKernel::Table,
         }),
     },
-    Group {
+    ParameterGroup {
         name: "mlp",
-        place: Place::Uniform,
+        place: ArrayStorage::Uniform,
         shape: |plan| vec![plan.layout.quads, 4],
-        start: Start::Drawn(Layout::initial_weights),
+        start: InitialValue::Drawn(Layout::initial_weights),
         rendered: true,
         learning: Some(Learning {
             rate: 1.0,
             l2: |optimizer| optimizer.l2,
-            moments: &[("mlp_first", Place::Storage, 1), ("mlp_second", Place::Storage, 1)],
-            kernel: Kernel::Dense("d_weights"),
+            moments: &[("mlp_first", ArrayStorage::Storage, 1), ("mlp_second", ArrayStorage::Storage, 1)],
+            kernel: AdamKernel::Dense("d_weights"),
         }),
     },
-    Group {
+    ParameterGroup {
         name: "occupancy",
-        place: Place::Storage,
+        place: ArrayStorage::Storage,
         shape: |plan| plan.space.grid_shape(plan.config.occupancy.cells).to_vec(),
-        start: Start::Cells(occupancy),
+        start: InitialValue::Cells(occupancy),
         rendered: false,
         learning: None,
     },
-    Group {
+    ParameterGroup {
         name: "occupancy_bits",
-        place: Place::Tensor(Element::U32),
+        place: ArrayStorage::Tensor(Element::U32),
         shape: |plan| vec![plan.cell_count() / 32],
-        start: Start::Cells(occupancy_bits),
+        start: InitialValue::Cells(occupancy_bits),
         rendered: true,
         learning: None,
     },
@@ -171,8 +171,8 @@ pub struct Array {
     pub shape: Vec<usize>,
     /// Whether rendering reads it.
     pub rendered: bool,
-    place: Place,
-    start: Start,
+    place: ArrayStorage,
+    start: InitialValue,
 }
 
 impl Array {
@@ -185,16 +185,16 @@ impl Array {
     /// Whether its numbers are words.
     #[must_use]
     pub fn has_words(&self) -> bool {
-        self.place == Place::Tensor(Element::U32)
+        self.place == ArrayStorage::Tensor(Element::U32)
     }
 
     /// What it holds before the first step of a training where nothing can be in the `hidden` cells.
     #[must_use]
     pub fn start(&self, plan: &Plan, hidden: &[bool]) -> Numbers {
         match self.start {
-            Start::Zeros => Numbers::Floats(vec![0.0; self.count()]),
-            Start::Drawn(draw) => Numbers::Floats(draw(&plan.layout, plan.config.seed)),
-            Start::Cells(from) => from(plan, hidden),
+            InitialValue::Zeros => Numbers::Floats(vec![0.0; self.count()]),
+            InitialValue::Drawn(draw) => Numbers::Floats(draw(&plan.layout, plan.config.seed)),
+            InitialValue::Cells(from) => from(plan, hidden),
         }
     }
 
@@ -202,9 +202,11 @@ impl Array {
     #[must_use]
     pub fn spec(&self, plan: &Plan) -> BufferSpec {
         match self.place {
-            Place::Tensor(element) => plan.tensor(self.name, element, self.count() * 4 / element.bytes()),
-            Place::Uniform => BufferSpec::uniform_storage::<u32>(self.name, self.count()),
-            Place::Storage => BufferSpec::storage::<u32>(self.name, self.count()),
+            ArrayStorage::Tensor(element) => {
+                plan.tensor(self.name, element, self.count() * 4 / element.bytes())
+            }
+            ArrayStorage::Uniform => BufferSpec::uniform_storage::<u32>(self.name, self.count()),
+            ArrayStorage::Storage => BufferSpec::storage::<u32>(self.name, self.count()),
         }
     }
 }
@@ -214,13 +216,13 @@ impl Plan {
     pub fn arrays(&self) -> impl Iterator<Item = Array> {
         GROUPS.iter().flat_map(|group| {
             let shape = (group.shape)(self);
-            let Group { name, place, start, rendered, .. } = *group;
+            let ParameterGroup { name, place, start, rendered, .. } = *group;
             let own = Array { name, shape: shape.clone(), rendered, place, start };
             let moments = group.learning.iter().flat_map(|learning| learning.moments);
             let moments = moments.map(move |&(name, place, per_parameter)| {
                 let mut shape = shape.clone();
                 shape.iter_mut().last().into_iter().for_each(|inner| *inner *= per_parameter);
-                Array { name, shape, rendered: false, place, start: Start::Zeros }
+                Array { name, shape, rendered: false, place, start: InitialValue::Zeros }
             });
             [own].into_iter().chain(moments).filter(|array| array.count() > 0)
         })

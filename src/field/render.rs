@@ -60,9 +60,9 @@ impl Renderer {
         workspace.allocate(gpu, &plan.viewing_buffers())?;
         let refill = march::scan(gpu, &plan, &workspace, march::Scanned::Free)?;
         let mut round = vec![viewing::rays(gpu, &plan, &workspace)?];
-        round.extend(march::stages_over(gpu, &plan, &workspace, false, march::Extent::Round)?);
+        round.extend(march::stages_over(gpu, &plan, &workspace, false, march::MarchExtent::Round)?);
         round.extend(density::stages(gpu, &plan, &workspace)?);
-        round.extend(color::stages(gpu, &plan, &workspace, color::Selection::View)?);
+        round.extend(color::stages(gpu, &plan, &workspace, color::SelectionMode::View)?);
         round.push(viewing::composite(gpu, &plan, &workspace)?);
         Ok(Self {
             gpu: Arc::clone(gpu),
@@ -102,7 +102,7 @@ impl Renderer {
         let pixels = camera.width as usize * camera.height as usize;
         let mut color = Vec::with_capacity(pixels);
         let mut depth = Vec::with_capacity(pixels);
-        let camera_in_box = field::Camera::in_box(camera, &self.plan.space);
+        let camera_in_box = field::DeviceCamera::in_box(camera, &self.plan.space);
         self.workspace.write(&self.gpu, "view_camera", &[camera_in_box]);
         while color.len() < pixels {
             let band = self.plan.rounds.band.min(pixels - color.len());

@@ -5,7 +5,7 @@
 
 use crate::field::layout::pcg;
 use crate::field::state::State;
-use crate::field::views::Views;
+use crate::field::views::TrainingViews;
 use crate::field::visibility::hidden_cells;
 use crate::field::{
     Counters, Field, Plan, Step, StepExcess, Workspace, backward, color, composite, density, dispatch, march,
@@ -57,7 +57,7 @@ impl Trainer {
     ///
     /// # Errors
     /// When a photo is missing, or the adapter cannot hold the table or the batch or refuses a kernel.
-    pub fn new(mut field: Field, views: Views) -> Result<Self> {
+    pub fn new(mut field: Field, views: TrainingViews) -> Result<Self> {
         views.check()?;
         let (gpu, plan) = (Arc::clone(&field.gpu), field.plan.clone());
         plan.check(&gpu)?;
@@ -242,7 +242,7 @@ fn step_stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, cameras: usize) ->
     let mut stages = vec![rays::stage(gpu, plan, workspace, cameras)?];
     stages.extend(march::stages(gpu, plan, workspace, true)?);
     stages.extend(density::stages(gpu, plan, workspace)?);
-    stages.extend(color::stages(gpu, plan, workspace, color::Selection::Training)?);
+    stages.extend(color::stages(gpu, plan, workspace, color::SelectionMode::Training)?);
     stages.push(composite::stage(gpu, plan, workspace, false)?);
     stages.extend(backward::stages(gpu, plan, workspace)?);
     stages.extend(backward::weights(gpu, plan, workspace)?);

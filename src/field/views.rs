@@ -15,13 +15,13 @@ use std::sync::Arc;
 
 /// Views whose photos are added one by one, so that not all of them need to be decoded at a time.
 #[derive(Debug)]
-pub struct Views {
+pub struct TrainingViews {
     pub(crate) cameras: Vec<Camera>,
     pub(crate) space: Space,
     /// One per photo that was added.
     pub(crate) silhouettes: Vec<Silhouette>,
     /// In box space; one per photo of which a pixel can be drawn.
-    pub(crate) on_device: Vec<field::Camera>,
+    pub(crate) on_device: Vec<field::DeviceCamera>,
     pub(crate) pages: PagedArray,
     gpu: Arc<Gpu>,
     record: Record,
@@ -30,7 +30,7 @@ pub struct Views {
     row: usize,
 }
 
-impl Views {
+impl TrainingViews {
     /// Room for the photos of `cameras`, which are in world space.
     ///
     /// # Errors
@@ -39,10 +39,10 @@ impl Views {
         Self::within(gpu, plan, cameras, PageCapacity::of(&gpu.device.limits(), plan.memory))
     }
 
-    /// As [`Views::new`], divided as `capacity` says.
+    /// As [`TrainingViews::new`], divided as `capacity` says.
     ///
     /// # Errors
-    /// As [`Views::new`].
+    /// As [`TrainingViews::new`].
     pub fn within(gpu: &Arc<Gpu>, plan: &Plan, cameras: &[Camera], capacity: PageCapacity) -> Result<Self> {
         let record = plan.record();
         let pixels = |camera: &Camera| camera.width as usize * camera.height as usize;
@@ -92,8 +92,8 @@ impl Views {
         let pixel_count = (records.len() / self.record.words()) as u32;
         if pixel_count > 0 {
             let first_row = self.row as u32;
-            let camera = field::Camera::in_box(camera, &self.space);
-            self.on_device.push(field::Camera { first_row, pixel_count, ..camera });
+            let camera = field::DeviceCamera::in_box(camera, &self.space);
+            self.on_device.push(field::DeviceCamera { first_row, pixel_count, ..camera });
         }
         self.row += rows_of(records.len());
         self.silhouettes.push(Silhouette::of(photo));

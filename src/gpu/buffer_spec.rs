@@ -11,14 +11,14 @@ use wgpu::BufferUsages;
 pub struct BufferSpec {
     /// The name of the WGSL variable it stands for.
     pub name: &'static str,
-    kind: Kind,
+    kind: Storage,
     /// Bytes of an element.
     size: usize,
     count: usize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum Storage {
     Buffer(BufferUsages),
     Tensor(Element, TensorMemory),
 }
@@ -36,14 +36,14 @@ impl BufferSpec {
     /// A storage buffer of `count` elements of `T`.
     #[must_use]
     pub fn storage<T>(name: &'static str, count: usize) -> Self {
-        Self { name, kind: Kind::Buffer(BufferUsages::STORAGE), size: size_of::<T>(), count }
+        Self { name, kind: Storage::Buffer(BufferUsages::STORAGE), size: size_of::<T>(), count }
     }
 
     /// A buffer that kernels read as uniform and write as storage.
     #[must_use]
     pub fn uniform_storage<T>(name: &'static str, count: usize) -> Self {
         Self {
-            kind: Kind::Buffer(BufferUsages::STORAGE | BufferUsages::UNIFORM),
+            kind: Storage::Buffer(BufferUsages::STORAGE | BufferUsages::UNIFORM),
             ..Self::storage::<T>(name, count)
         }
     }
@@ -51,20 +51,20 @@ impl BufferSpec {
     /// A uniform buffer of one `T`.
     #[must_use]
     pub fn uniform<T>(name: &'static str) -> Self {
-        Self { kind: Kind::Buffer(BufferUsages::UNIFORM), ..Self::storage::<T>(name, 1) }
+        Self { kind: Storage::Buffer(BufferUsages::UNIFORM), ..Self::storage::<T>(name, 1) }
     }
 
     /// A storage buffer of words that also holds the sizes of indirect dispatches.
     #[must_use]
     pub fn indirect(name: &'static str, count: usize) -> Self {
-        let kind = Kind::Buffer(BufferUsages::STORAGE | BufferUsages::INDIRECT);
+        let kind = Storage::Buffer(BufferUsages::STORAGE | BufferUsages::INDIRECT);
         Self { kind, ..Self::storage::<u32>(name, count) }
     }
 
     /// A tensor.
     #[must_use]
     pub fn tensor(name: &'static str, element: Element, count: usize, memory: TensorMemory) -> Self {
-        Self { name, kind: Kind::Tensor(element, memory), size: element.bytes(), count }
+        Self { name, kind: Storage::Tensor(element, memory), size: element.bytes(), count }
     }
 
     /// Bytes on the device, but for the rounding of small buffers.
@@ -79,7 +79,7 @@ impl BufferSpec {
     /// When it cannot; the message tells both sizes.
     pub fn check(&self, gpu: &Gpu) -> Result<()> {
         match self.kind {
-            Kind::Tensor(_, TensorMemory::Textures) => gpu.check_texture(self.name, self.count),
+            Storage::Tensor(_, TensorMemory::Textures) => gpu.check_texture(self.name, self.count),
             _ => gpu.check_buffer(self.name, self.bytes()),
         }
     }
@@ -90,8 +90,8 @@ impl BufferSpec {
     /// When it is larger than the adapter can bind; the message tells both sizes.
     pub fn allocate(&self, gpu: &Gpu) -> Result<Allocation> {
         Ok(match self.kind {
-            Kind::Buffer(usage) => Allocation::Buffer(gpu.buffer(self.name, self.bytes(), usage)?),
-            Kind::Tensor(element, memory) => {
+            Storage::Buffer(usage) => Allocation::Buffer(gpu.buffer(self.name, self.bytes(), usage)?),
+            Storage::Tensor(element, memory) => {
                 Allocation::Tensor(gpu.tensor(self.name, element, self.count, memory)?)
             }
         })

@@ -132,12 +132,12 @@ pub struct Tensor {
     /// Number of elements.
     pub count: usize,
     /// Where they live.
-    pub place: Place,
+    pub place: TensorStorage,
 }
 
 /// Where a tensor lives.
 #[derive(Clone, Debug)]
-pub enum Place {
+pub enum TensorStorage {
     /// A storage buffer.
     Buffer(wgpu::Buffer),
     /// A texture and its only view.
@@ -154,8 +154,8 @@ impl Tensor {
     /// The commands that set it to zero.
     pub fn clear(&self, encoder: &mut wgpu::CommandEncoder) {
         match &self.place {
-            Place::Buffer(buffer) => encoder.clear_buffer(buffer, 0, None),
-            Place::Texture(texture, _) => {
+            TensorStorage::Buffer(buffer) => encoder.clear_buffer(buffer, 0, None),
+            TensorStorage::Texture(texture, _) => {
                 encoder.clear_texture(texture, &wgpu::ImageSubresourceRange::default());
             }
         }
@@ -185,7 +185,9 @@ impl Gpu {
         memory: TensorMemory,
     ) -> Result<Tensor> {
         let place = match memory {
-            TensorMemory::Buffers => Place::Buffer(self.storage::<u8>(name, count * element.bytes())?.raw),
+            TensorMemory::Buffers => {
+                TensorStorage::Buffer(self.storage::<u8>(name, count * element.bytes())?.raw)
+            }
             TensorMemory::Textures => self.texture(name, element, count)?,
         };
         Ok(Tensor { name, element, count, place })
@@ -203,7 +205,7 @@ impl Gpu {
         Ok(())
     }
 
-    fn texture(&self, name: &'static str, element: Element, count: usize) -> Result<Place> {
+    fn texture(&self, name: &'static str, element: Element, count: usize) -> Result<TensorStorage> {
         self.check_texture(name, count)?;
         let rows = texture_rows(count);
         use wgpu::TextureUsages as Usage;
@@ -218,15 +220,15 @@ impl Gpu {
             view_formats: &[],
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Ok(Place::Texture(texture, view))
+        Ok(TensorStorage::Texture(texture, view))
     }
 
     /// Writes `data` at the tensor's start, before the next submission.
     pub fn write_tensor<T: Pod>(&self, tensor: &Tensor, data: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         match &tensor.place {
-            Place::Buffer(buffer) => self.queue.write_buffer(buffer, 0, bytes),
-            Place::Texture(texture, _) => {
+            TensorStorage::Buffer(buffer) => self.queue.write_buffer(buffer, 0, bytes),
+            TensorStorage::Texture(texture, _) => {
                 let row = WIDTH * tensor.element.bytes();
                 let mut padded = bytes.to_vec();
                 padded.resize(bytes.len().next_multiple_of(row), 0);
@@ -253,8 +255,8 @@ impl Gpu {
     /// When the device was lost.
     pub fn read_tensor<T: Pod>(&self, tensor: &Tensor, count: usize) -> Result<Vec<T>> {
         let bytes = count * size_of::<T>();
-        let (Place::Texture(texture, _), 1..) = (&tensor.place, count) else {
-            let Place::Buffer(buffer) = &tensor.place else { return Ok(Vec::new()) };
+        let (TensorStorage::Texture(texture, _), 1..) = (&tensor.place, count) else {
+            let TensorStorage::Buffer(buffer) = &tensor.place else { return Ok(Vec::new()) };
             return self.read(&super::buffer::Buffer { name: tensor.name, raw: buffer.clone() }, 0, count);
         };
         let row = WIDTH * tensor.element.bytes();

@@ -116,13 +116,13 @@ pub struct Stages {
     /// Steps that were timed.
     pub steps: u64,
     /// The stages, the longest first.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<StageTime>,
 }
 
 /// One stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Stage {
+pub struct StageTime {
     /// Its name.
     pub stage: String,
     /// Milliseconds per step on the device.

@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::capture::dataset::Dataset;
 use crate::config::Config;
 use crate::field::train::Trainer;
-use crate::field::views::Views;
+use crate::field::views::TrainingViews;
 use crate::field::{Field, Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
 use anyhow::Result;
@@ -45,9 +45,9 @@ impl<'a> TrainingPhotos<'a> {
     ///
     /// # Errors
     /// When a file cannot be read, the device cannot hold the photos, or they are not as the plan was told.
-    pub fn load(&self, gpu: &Arc<Gpu>, plan: &Plan, observer: &mut dyn Observer) -> Result<Views> {
+    pub fn load(&self, gpu: &Arc<Gpu>, plan: &Plan, observer: &mut dyn Observer) -> Result<TrainingViews> {
         let (dataset, frames) = (self.dataset, self.frames);
-        let mut views = Views::new(gpu, plan, &self.cameras())?;
+        let mut views = TrainingViews::new(gpu, plan, &self.cameras())?;
         let mut ignored = Vec::new();
         observer.notice(&Event::Loading { done: 0, all: frames.len() });
         dataset.stream(frames, plan.features.depth, &mut |position, photo| {

@@ -9,7 +9,7 @@ use crate::camera::orbit::Orbit;
 use crate::capture::dataset::{Dataset, evenly_spaced};
 use crate::config::Config;
 use crate::config::schedule::Budget;
-use crate::field::checkpoint::{Checkpoint, FORMAT, Metadata, Splits};
+use crate::field::checkpoint::{Checkpoint, FORMAT, Metadata, SplitNames};
 use crate::field::layout::{Layout, finest_resolution};
 use crate::field::render::Renderer;
 use crate::field::state::State;
@@ -156,7 +156,11 @@ fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<Metadat
         budget: Budget::default(),
         features: SceneFeatures::of(dataset, &config)?,
         reading: dataset.reading.clone(),
-        splits: Splits { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) },
+        splits: SplitNames {
+            train: names(&dataset.train),
+            val: names(&dataset.val),
+            test: names(&dataset.test),
+        },
         image_size: [orbit.width, orbit.height],
         has_alpha: dataset.is_cutout,
         orbit,

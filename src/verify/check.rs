@@ -36,35 +36,38 @@ mod workbench;
 pub use check_result::CheckResult;
 pub use checked_adapter::{CheckedAdapter, Forced};
 pub use setup::Setup;
-pub use workbench::{Kept, Outcome, Workbench, visible_cells};
+pub use workbench::{KeptSample, PassOutput, Workbench, visible_cells};
 
 use anyhow::{Context, Result};
 
 /// A check: what it is of, and what runs it.
-struct Check {
+struct KernelCheck {
     name: &'static str,
     run: fn(&CheckedAdapter) -> Result<Vec<CheckResult>>,
 }
 
 /// In the order of a training step.
-const CHECKS: [Check; 17] = [
-    Check { name: "exponentials", run: |adapter| Ok(vec![exponential::exponentials(adapter)?]) },
-    Check { name: "random numbers", run: |adapter| Ok(vec![random::random_numbers(adapter)?]) },
-    Check { name: "lenses", run: lens::lens_models },
-    Check { name: "rays of views", run: rays::view_rays },
-    Check { name: "rays of large views", run: rays::sharp_rays },
-    Check { name: "rays of a training", run: |adapter| Ok(vec![rays::training_rays(adapter)?]) },
-    Check { name: "marching", run: marching::marched_samples },
-    Check { name: "hash grid", run: |adapter| Ok(vec![grid::features(adapter)?]) },
-    Check { name: "selection", run: |adapter| Ok(vec![selection::selected_samples(adapter)?]) },
-    Check { name: "harmonics", run: |adapter| Ok(vec![harmonics::harmonics(adapter)?]) },
-    Check { name: "activations", run: |adapter| Ok(vec![activation::activations(adapter)?]) },
-    Check { name: "networks and scatter", run: |adapter| networks::networks(adapter, &networks::SHAPES) },
-    Check { name: "render, loss and gradient", run: compositing },
-    Check { name: "further terms of the loss", run: loss::further_terms },
-    Check { name: "Adam", run: adam::adam },
-    Check { name: "occupancy", run: |adapter| Ok(vec![occupancy::occupancy_update(adapter)?]) },
-    Check { name: "whole steps and views", run: whole },
+const CHECKS: [KernelCheck; 17] = [
+    KernelCheck { name: "exponentials", run: |adapter| Ok(vec![exponential::exponentials(adapter)?]) },
+    KernelCheck { name: "random numbers", run: |adapter| Ok(vec![random::random_numbers(adapter)?]) },
+    KernelCheck { name: "lenses", run: lens::lens_models },
+    KernelCheck { name: "rays of views", run: rays::view_rays },
+    KernelCheck { name: "rays of large views", run: rays::sharp_rays },
+    KernelCheck { name: "rays of a training", run: |adapter| Ok(vec![rays::training_rays(adapter)?]) },
+    KernelCheck { name: "marching", run: marching::marched_samples },
+    KernelCheck { name: "hash grid", run: |adapter| Ok(vec![grid::features(adapter)?]) },
+    KernelCheck { name: "selection", run: |adapter| Ok(vec![selection::selected_samples(adapter)?]) },
+    KernelCheck { name: "harmonics", run: |adapter| Ok(vec![harmonics::harmonics(adapter)?]) },
+    KernelCheck { name: "activations", run: |adapter| Ok(vec![activation::activations(adapter)?]) },
+    KernelCheck {
+        name: "networks and scatter",
+        run: |adapter| networks::networks(adapter, &networks::SHAPES),
+    },
+    KernelCheck { name: "render, loss and gradient", run: compositing },
+    KernelCheck { name: "further terms of the loss", run: loss::further_terms },
+    KernelCheck { name: "Adam", run: adam::adam },
+    KernelCheck { name: "occupancy", run: |adapter| Ok(vec![occupancy::occupancy_update(adapter)?]) },
+    KernelCheck { name: "whole steps and views", run: whole },
 ];
 
 fn compositing(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {

@@ -3,9 +3,9 @@
 use crate::program::{answer, nerf};
 use crate::support::folder;
 use assert_cmd::Command;
+use nerf::config::Transmittance;
 use nerf::verify::check::inputs::Random;
 use nerf::verify::check::stress_rays::StressRay;
-use nerf::verify::reference::Transmittance;
 use nerf::verify::reference::vectors::{GoldenFile, NOT_FINITE};
 use predicates::prelude::*;
 use predicates::str::contains;

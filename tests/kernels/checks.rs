@@ -5,7 +5,7 @@ use anyhow::Result;
 use nerf::config::Accumulation;
 use nerf::field::layer::Product;
 use nerf::gpu::tensor::TensorMemory;
-use nerf::verify::check::networks::{SHAPES, Shape, networks};
+use nerf::verify::check::networks::{FieldShape, SHAPES, networks};
 use nerf::verify::check::{
     Forced, activation, adam, exponential, fused, grid, harmonics, lens, loss, marching, occupancy, random,
     rays, selection, step, thinned, view,
@@ -87,7 +87,8 @@ fn networks_and_scatter() -> Result<()> {
 
 #[test]
 fn networks_of_further_shapes() -> Result<()> {
-    let shape = |width, color_layers, hdr| Shape { levels: 8, width, color_layers, hdr, saturated: false };
+    let shape =
+        |width, color_layers, hdr| FieldShape { levels: 8, width, color_layers, hdr, saturated: false };
     passes(networks(&adapter()?, &[shape(16, 3, true), shape(32, 3, false), shape(64, 1, true)])?);
     Ok(())
 }
@@ -130,7 +131,7 @@ fn rendered_views() -> Result<()> {
 }
 
 /// A field that is quick to build, in every variant.
-const SMALL: &[Shape] = SHAPES.split_at(1).0;
+const SMALL: &[FieldShape] = SHAPES.split_at(1).0;
 
 /// The checks whose kernels an accumulation changes.
 #[test]

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use anyhow::Result;
+use nerf::config::Transmittance;
 use nerf::verify::check::fused::{BOUND, Fused, golden_rays};
 use nerf::verify::check::inputs::Random;
 use nerf::verify::check::stress_rays::StressRay;
-use nerf::verify::reference::Transmittance;
 use nerf::verify::reference::vectors::GoldenFile;
 
 use crate::bench::adapter;

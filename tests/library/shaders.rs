@@ -9,7 +9,7 @@ use nerf::config::{Accumulation, Config};
 use nerf::field::layer::Product;
 use nerf::field::link::{self, Link};
 use nerf::field::{Capabilities, LAYOUTS, Plan, SceneFeatures, Space, records};
-use nerf::gpu::kernel::Layout as StructLayout;
+use nerf::gpu::kernel::StructLayout;
 use nerf::gpu::paged_array::PageCapacity;
 use nerf::gpu::source::{Linked, Source};
 use nerf::gpu::tensor::TensorMemory;

@@ -7,7 +7,7 @@ use nerf::config::{Accumulation, Batch, ColorLoss, Config, Grid, March, Network,
 use nerf::field::render::{Renderer, View};
 use nerf::field::state::State;
 use nerf::field::train::{StepStats, Trainer};
-use nerf::field::views::Views;
+use nerf::field::views::TrainingViews;
 use nerf::field::{Counters, Field, Plan, SceneFeatures, Space};
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::{Image, Pixels};
@@ -100,7 +100,7 @@ impl Scene {
             ..SceneFeatures::default()
         };
         let plan = Plan::new(&gpu, config, features, Space::from(&bounds));
-        let mut views = Views::new(&gpu, &plan, &cameras).expect("room");
+        let mut views = TrainingViews::new(&gpu, &plan, &cameras).expect("room");
         images.into_iter().for_each(|image| views.add(&image.into()).expect("its photo"));
         let trainer = Trainer::new(Field::new(&gpu, plan).expect("a field"), views).expect("a trainer");
         Training { trainer, gpu, camera: cameras[0].clone() }

@@ -1,8 +1,8 @@
 //! Rays that are hard on arithmetic, with what the f64 reference makes of them.
 
+use nerf::config::Transmittance;
 use nerf::verify::check::inputs::Random;
 use nerf::verify::check::stress_rays::StressRay;
-use nerf::verify::reference::Transmittance;
 use nerf::verify::reference::vectors::GoldenFile;
 
 /// Rays of each kind.

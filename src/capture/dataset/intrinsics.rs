@@ -1,8 +1,8 @@
 //! Focal length, principal point and lens, from whichever keys a tool chose to write.
 
 mod calibration;
-mod extent;
 mod focal;
+mod image_size;
 mod lens;
 
 use std::f64::consts::{PI, TAU};
@@ -14,8 +14,8 @@ use super::json::{Fields, REMEDY};
 use super::notes::Notes;
 use crate::camera::{Camera, Lens};
 use crate::capture::diagnostics::{Diagnostic, Severity};
-use extent::{Extent, Measure};
 use focal::{Angles, Focal};
+use image_size::{ImageSize, Measure};
 
 /// The intrinsics of one frame as the file states them, not yet tied to an image size.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,11 +34,11 @@ pub(super) const OBJECTS: [&str; 4] = ["intrinsics", "camera_intrinsics", "camer
 /// What one object of a file says about a camera: a frame, an object nested in it, or the file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stated {
-    size: Extent,
+    size: ImageSize,
     focal_px: Option<DVec2>,
     angles: Angles,
     center_px: Option<DVec2>,
-    lens: lens::Stated,
+    lens: lens::StatedLens,
 }
 
 impl Stated {
@@ -46,11 +46,11 @@ impl Stated {
     pub(super) fn read(fields: Fields, owner: &str, notes: &mut Notes) -> Result<Self> {
         let matrix = calibration::read(fields, owner, notes)?;
         Ok(Self {
-            size: Extent::read(fields)?,
+            size: ImageSize::read(fields)?,
             focal_px: focal::pixels(fields)?.or(matrix.map(|matrix| matrix.focal_px)),
             angles: Angles::read(fields, owner, notes)?,
             center_px: center(fields)?.or(matrix.and_then(|matrix| matrix.center_px)),
-            lens: lens::Stated::read(fields, owner, notes)?,
+            lens: lens::StatedLens::read(fields, owner, notes)?,
         })
     }
 }
@@ -59,7 +59,7 @@ impl Intrinsics {
     /// Chooses from what is stated, in falling priority: the frame, what is nested in it, the file.
     pub(super) fn resolve(layers: &[&Stated], owner: &str, notes: &mut Notes) -> Result<Self> {
         let lens = lens::resolve(layers.iter().map(|layer| &layer.lens), owner, notes);
-        let declared = layers.iter().fold(Extent::default(), |known, layer| known.or(layer.size));
+        let declared = layers.iter().fold(ImageSize::default(), |known, layer| known.or(layer.size));
         let size_of = |layer: &Stated| layer.size.or(declared).or(layer.implied_size());
         let center =
             layers.iter().find_map(|layer| Some(Measure { px: layer.center_px?, size: size_of(layer) }));
@@ -157,16 +157,16 @@ impl Intrinsics {
 
 impl Stated {
     /// The size at which focal lengths and fields of view say the same, for files that have no `w` and `h`.
-    fn implied_size(&self) -> Extent {
+    fn implied_size(&self) -> ImageSize {
         let Some(focal) = self.focal_px else {
-            return Extent::default();
+            return ImageSize::default();
         };
         let [x, y] = self.angles.half_tangents();
-        Extent::implied(x.map(|tangent| 2.0 * focal.x * tangent), y.map(|tangent| 2.0 * focal.y * tangent))
+        ImageSize::implied(x.map(|tangent| 2.0 * focal.x * tangent), y.map(|tangent| 2.0 * focal.y * tangent))
     }
 
     /// Two statements about the same lens that disagree are worth a look at the file.
-    fn compare(&self, size: Extent, lens: &Lens, owner: &str, notes: &mut Notes) {
+    fn compare(&self, size: ImageSize, lens: &Lens, owner: &str, notes: &mut Notes) {
         let (Some(focal), Some(size)) = (self.focal_px, size.both()) else {
             return;
         };

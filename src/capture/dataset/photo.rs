@@ -11,7 +11,7 @@ use crate::photo::{BitDepth, Image};
 
 /// Where a frame's pixels come from.
 #[derive(Clone, Debug)]
-pub(super) struct Source {
+pub(super) struct PhotoSource {
     /// Width and height of the image file, in pixels.
     pub(super) stored: [u32; 2],
     /// How the stored image is turned.
@@ -93,7 +93,7 @@ impl Frame {
 
     /// The whole picture, turned, as its pixels are to be understood.
     pub(super) fn upright(&self, how: How) -> Result<Image> {
-        let Source { stored, turn, sidecars, .. } = &self.source;
+        let PhotoSource { stored, turn, sidecars, .. } = &self.source;
         let mut image = Image::load(&self.path)?;
         let show = self.path.display();
         ensure!(
@@ -158,7 +158,7 @@ impl Frame {
 
     /// The values of a sidecar of `size` on the part of the picture that is used.
     fn fitted<T: Copy>(&self, values: Vec<T>, size: [u32; 2]) -> Vec<T> {
-        let Source { stored, turn, window, .. } = &self.source;
+        let PhotoSource { stored, turn, window, .. } = &self.source;
         let is_wide = |[width, height]: [u32; 2]| width > height;
         // One that was made of the turned picture needs no turn.
         let (values, size) = match turn.filter(|_| is_wide(size) == is_wide(*stored)) {
@@ -171,7 +171,7 @@ impl Frame {
 
     /// Most bytes that loading takes, the photo included.
     fn decoding_bytes(&self) -> u64 {
-        let Source { stored, sidecars, .. } = &self.source;
+        let PhotoSource { stored, sidecars, .. } = &self.source;
         let image = self.bits.decoding_bytes_per_pixel();
         // Beside the decoded picture: a decoded sidecar, a number for each of its pixels, and that at the
         // picture's size.
@@ -181,7 +181,7 @@ impl Frame {
     }
 }
 
-impl Source {
+impl PhotoSource {
     /// Width and height of the turned picture.
     pub(super) fn upright_size(&self) -> [u32; 2] {
         self.turn.map_or(self.stored, |turn| turn.size(self.stored))

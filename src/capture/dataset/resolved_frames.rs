@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::listing::{FrameEntry, Listing};
 use super::notes::Notes;
-use super::photo::Source;
+use super::photo::PhotoSource;
 use super::sidecars::{Finder, Sidecars};
 use super::{Frame, OpenOptions, Split, frames};
 use crate::capture::diagnostics::Severity;
@@ -224,7 +224,7 @@ fn frame(
         bits: header.bits,
         has_mask: !sidecars.masks.is_empty(),
         has_depth: sidecars.depth.is_some(),
-        source: Source { stored, turn, window, sidecars },
+        source: PhotoSource { stored, turn, window, sidecars },
     })
 }
 

@@ -1,7 +1,7 @@
 //! Poses that are all read the wrong way: other axes, or the inverse matrix.
 
 use super::view_directions::ViewDirections;
-use super::{Diagnostic, Scene};
+use super::{CameraSet, Diagnostic};
 use crate::camera::Camera;
 use crate::capture::focus::{FocusKind, OpticalAxis, find};
 use crate::support::format::{percent, point};
@@ -59,7 +59,7 @@ struct Agreement {
 }
 
 /// Whether another reading of all poses makes the cameras look at one point, which they do not as they are.
-pub(super) fn examine(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Diagnostic> {
+pub(super) fn examine(scene: &CameraSet<'_>, directions: &ViewDirections) -> Vec<Diagnostic> {
     let looks = directions.meets || directions.seeing >= DOUBTFUL;
     if looks || scene.count() < LEAST_VIEWS {
         return Vec::new();
@@ -102,7 +102,7 @@ pub(super) fn examine(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Dia
 }
 
 /// How well the cameras agree when their poses are read that way; `None` where they do not.
-fn agreement(scene: &Scene<'_>, turn: fn(DAffine3) -> DAffine3) -> Option<Agreement> {
+fn agreement(scene: &CameraSet<'_>, turn: fn(DAffine3) -> DAffine3) -> Option<Agreement> {
     let axis = |camera: &Camera| {
         OpticalAxis::of(&Camera { world_from_camera: turn(camera.world_from_camera), ..camera.clone() })
     };

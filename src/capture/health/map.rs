@@ -11,9 +11,9 @@ use crate::camera::{Camera, Lens};
 use crate::capture::dataset::Dataset;
 use crate::photo::Split;
 use crate::support::format::{count, length, point};
-use drawing::{Anchor, Color, Shape, Stroke};
+use drawing::{Anchor, Color, DrawnShape, Stroke};
 use glam::{DVec2, DVec3, dvec2};
-use panel::{Panel, Projection};
+use panel::{Panel, PanelProjection};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -44,7 +44,7 @@ pub fn draw(dataset: &Dataset, survey: &Survey, marked: &HashSet<usize>) -> Draw
     let map = Map::new(dataset, survey, marked);
     let mut drawing = Drawing::new(SIZE, GROUND);
     let width = 0.5 * (SIZE.x - 3.0 * MARGIN);
-    let projections = Projection::above_and_beside(survey.directions.up);
+    let projections = PanelProjection::above_and_beside(survey.directions.up);
     let corners = [dvec2(MARGIN, HEADER), dvec2(2.0 * MARGIN + width, HEADER)];
     let size = dvec2(width, SIZE.y - HEADER - FOOTER);
     let range = map.range(&projections, size);
@@ -126,7 +126,7 @@ impl<'a> Map<'a> {
         if low == high { (low - 1.0, high + 1.0) } else { (low, high) }
     }
 
-    fn range(&self, projections: &[Projection; 2], size: DVec2) -> Range {
+    fn range(&self, projections: &[PanelProjection; 2], size: DVec2) -> Range {
         let (low, high) = self.extent();
         let center = 0.5 * (low + high);
         let corners = panel::corners(low, high);
@@ -141,7 +141,8 @@ impl<'a> Map<'a> {
 
     /// Returns whether some of the whole box is inside.
     fn draw_panel(&self, panel: &Panel, title: &str, drawing: &mut Drawing) -> bool {
-        drawing.push(Shape::rectangle(panel.corner, panel.size).with(Stroke::new(FAINT.faint(0.5), 1.0)));
+        drawing
+            .push(DrawnShape::rectangle(panel.corner, panel.size).with(Stroke::new(FAINT.faint(0.5), 1.0)));
         let shows_whole_box = self.draw_box(panel, drawing);
         let weight = (30.0 / self.survey.views.len() as f64).clamp(0.12, 0.6);
         for &frame in &self.survey.views {
@@ -198,8 +199,8 @@ impl<'a> Map<'a> {
         let arm = 8.0;
         for [dx, dy] in [[arm, 0.0], [0.0, arm]] {
             let arm = dvec2(dx, dy);
-            drawing.push(Shape::line([at - arm, at + arm]).with(Stroke::new(GROUND, 4.0)));
-            drawing.push(Shape::line([at - arm, at + arm]).with(Stroke::new(INK, 1.6)));
+            drawing.push(DrawnShape::line([at - arm, at + arm]).with(Stroke::new(GROUND, 4.0)));
+            drawing.push(DrawnShape::line([at - arm, at + arm]).with(Stroke::new(INK, 1.6)));
         }
     }
 
@@ -217,7 +218,9 @@ impl<'a> Map<'a> {
             // It sees everything.
             let radius = 0.4 * self.frustum * panel.scale;
             drawing.push(
-                Shape::circle(panel.place(position), radius).filled(stroke.color.faint(0.18)).with(stroke),
+                DrawnShape::circle(panel.place(position), radius)
+                    .filled(stroke.color.faint(0.18))
+                    .with(stroke),
             );
         }
         let size = dvec2(f64::from(camera.width), f64::from(camera.height));
@@ -228,13 +231,13 @@ impl<'a> Map<'a> {
         let picture: Vec<DVec2> = ends.iter().map(|end| panel.place(*end)).collect();
         let fill = stroke.color.faint(0.18);
         if has_rims {
-            drawing.push(Shape::closed(picture).filled(fill).with(stroke));
+            drawing.push(DrawnShape::closed(picture).filled(fill).with(stroke));
         }
         for (ray, end) in rays.iter().zip(ends) {
             panel.line([ray.origin, end], stroke, drawing);
         }
         drawing.push(
-            Shape::circle(panel.place(position), if is_marked { 3.2 } else { 1.6 }).filled(stroke.color),
+            DrawnShape::circle(panel.place(position), if is_marked { 3.2 } else { 1.6 }).filled(stroke.color),
         );
     }
 
@@ -279,7 +282,7 @@ impl<'a> Map<'a> {
             let number = number(color);
             if number > 0 {
                 let at = dvec2(x, 42.0);
-                drawing.push(Shape::rectangle(at, dvec2(11.0, 11.0)).filled(color));
+                drawing.push(DrawnShape::rectangle(at, dvec2(11.0, 11.0)).filled(color));
                 x = drawing.text(
                     at + dvec2(16.0, 10.0),
                     &format!("{number} {name}"),
@@ -297,7 +300,7 @@ impl<'a> Map<'a> {
             lines.push((Stroke::new(FAINT, 1.0).dashed(), name));
         }
         for (stroke, name) in lines {
-            drawing.push(Shape::line([dvec2(x, 47.0), dvec2(x + 18.0, 47.0)]).with(stroke));
+            drawing.push(DrawnShape::line([dvec2(x, 47.0), dvec2(x + 18.0, 47.0)]).with(stroke));
             x = drawing.text(dvec2(x + 23.0, 52.0), name, TEXT, INK, Anchor::Start) + 18.0;
         }
         drawing.text(dvec2(x, 52.0), "+ focus", TEXT, INK, Anchor::Start);

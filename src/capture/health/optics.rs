@@ -1,6 +1,6 @@
 //! Focal lengths, fields of view, principal points and lenses, and whether they agree.
 
-use super::{Diagnostic, Scene, Spread};
+use super::{CameraSet, Diagnostic, Spread};
 use crate::camera::{Camera, LensKind};
 use crate::support::format::{count, percent};
 use glam::{DVec2, dvec2};
@@ -35,7 +35,7 @@ const MOST_FOV_DEGREES: f64 = 150.0;
 const FAR_OFF: f64 = 0.25;
 
 impl Optics {
-    pub(super) fn of(scene: &Scene<'_>) -> Self {
+    pub(super) fn of(scene: &CameraSet<'_>) -> Self {
         let spread = |value: &dyn Fn(&Camera) -> f64| Spread::of(scene.cameras().map(value));
         let center_off = |axis: usize| spread(&|camera| center_off(camera)[axis]);
         Self {
@@ -47,7 +47,7 @@ impl Optics {
         }
     }
 
-    pub(super) fn findings(&self, scene: &Scene<'_>) -> Vec<Diagnostic> {
+    pub(super) fn findings(&self, scene: &CameraSet<'_>) -> Vec<Diagnostic> {
         [odd_focal_lengths(scene), oblong_pixels(scene), odd_fields_of_view(scene), far_off_centers(scene)]
             .into_iter()
             .flatten()
@@ -89,7 +89,7 @@ fn is_flat(camera: &Camera) -> bool {
     matches!(camera.lens.kind(), LensKind::Pinhole | LensKind::OpenCv)
 }
 
-fn odd_focal_lengths(scene: &Scene<'_>) -> Option<Diagnostic> {
+fn odd_focal_lengths(scene: &CameraSet<'_>) -> Option<Diagnostic> {
     let mut odd = Vec::new();
     let mut told = None;
     let cameras: Vec<&Camera> = scene.cameras().collect();
@@ -123,7 +123,7 @@ fn odd_focal_lengths(scene: &Scene<'_>) -> Option<Diagnostic> {
     )
 }
 
-fn oblong_pixels(scene: &Scene<'_>) -> Option<Diagnostic> {
+fn oblong_pixels(scene: &CameraSet<'_>) -> Option<Diagnostic> {
     let cameras: Vec<&Camera> = scene.cameras().collect();
     let ratio = |view: usize| cameras[view].focal_px.x / cameras[view].focal_px.y;
     let frames = scene.which(|view| (ratio(view) - 1.0).abs() > SQUARE);
@@ -145,7 +145,7 @@ fn oblong_pixels(scene: &Scene<'_>) -> Option<Diagnostic> {
     )
 }
 
-fn odd_fields_of_view(scene: &Scene<'_>) -> Option<Diagnostic> {
+fn odd_fields_of_view(scene: &CameraSet<'_>) -> Option<Diagnostic> {
     let cameras: Vec<&Camera> = scene.cameras().collect();
     let is_odd = |view: usize| {
         let fov = fov_degrees(cameras[view]);
@@ -172,7 +172,7 @@ fn odd_fields_of_view(scene: &Scene<'_>) -> Option<Diagnostic> {
     )
 }
 
-fn far_off_centers(scene: &Scene<'_>) -> Option<Diagnostic> {
+fn far_off_centers(scene: &CameraSet<'_>) -> Option<Diagnostic> {
     let cameras: Vec<&Camera> = scene.cameras().collect();
     let is_far = |view: usize| center_off(cameras[view]).abs().max_element() > FAR_OFF;
     let first = (0..cameras.len()).find(|&view| is_far(view))?;

@@ -1,7 +1,7 @@
 //! Single poses that look wrong: far from the others, turned away, or given twice.
 
 use super::view_directions::ViewDirections;
-use super::{Diagnostic, Scene, Spread};
+use super::{CameraSet, Diagnostic, Spread};
 use crate::camera::LensKind;
 use crate::capture::dataset::Dataset;
 use crate::support::format::{count, length};
@@ -28,7 +28,7 @@ const TURNED_AWAY: f64 = 2.0;
 const SAME: f64 = 1e-6;
 
 /// Cameras that are far from all others, or look elsewhere.
-pub(super) fn outliers(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<Diagnostic> {
+pub(super) fn outliers(scene: &CameraSet<'_>, directions: &ViewDirections) -> Vec<Diagnostic> {
     if scene.count() < LEAST_VIEWS {
         return Vec::new();
     }
@@ -85,16 +85,16 @@ fn are(views: &[usize]) -> String {
     format!("{} {}", count(views.len(), "camera"), if views.len() == 1 { "is" } else { "are" })
 }
 
-fn frames(scene: &Scene<'_>, views: &[usize]) -> Vec<usize> {
+fn frames(scene: &CameraSet<'_>, views: &[usize]) -> Vec<usize> {
     views.iter().map(|&view| scene.views[view]).collect()
 }
 
-fn is_few(views: &[usize], scene: &Scene<'_>) -> bool {
+fn is_few(views: &[usize], scene: &CameraSet<'_>) -> bool {
     !views.is_empty() && views.len() as f64 <= f64::max(1.0, FEW * scene.count() as f64)
 }
 
 /// Whether the frames before and after are of the same folder, and so perhaps of one sequence.
-fn is_within_folder(scene: &Scene<'_>, view: usize) -> bool {
+fn is_within_folder(scene: &CameraSet<'_>, view: usize) -> bool {
     let folder =
         |view: usize| scene.dataset.frames[scene.views[view]].name.rsplit_once('/').map(|parts| parts.0);
     folder(view - 1) == folder(view) && folder(view) == folder(view + 1)
@@ -125,7 +125,7 @@ fn jumps(positions: &[DVec3]) -> Vec<usize> {
     (1..positions.len() - 1).filter(is_jump).collect()
 }
 
-fn away(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<usize> {
+fn away(scene: &CameraSet<'_>, directions: &ViewDirections) -> Vec<usize> {
     if !directions.meets || directions.seeing < NEARLY_ALL {
         return Vec::new();
     }
@@ -142,7 +142,7 @@ fn away(scene: &Scene<'_>, directions: &ViewDirections) -> Vec<usize> {
 }
 
 /// Pairs of frames with different images and the same pose; of several with one pose, each with the first.
-pub(super) fn repeated(scene: &Scene<'_>) -> Vec<[usize; 2]> {
+pub(super) fn repeated(scene: &CameraSet<'_>) -> Vec<[usize; 2]> {
     let extent = scene.extent();
     let cameras: Vec<_> = scene.cameras().collect();
     // All cameras at one place is another matter.

@@ -1,6 +1,6 @@
 //! Where the cameras look: the point their axes meet in, how nearly, and from how many sides.
 
-use super::{Diagnostic, Scene, Spread};
+use super::{CameraSet, Diagnostic, Spread};
 use crate::camera::orbit::Orbit;
 use crate::capture::focus::FocusKind;
 use crate::support::format::{count, length, percent};
@@ -67,7 +67,7 @@ const STEEP: f64 = 0.9;
 const MANY_ROLLED: f64 = 0.25;
 
 impl ViewDirections {
-    pub(super) fn of(scene: &Scene<'_>) -> Self {
+    pub(super) fn of(scene: &CameraSet<'_>) -> Self {
         let focus = scene.focus.point;
         let cameras: Vec<_> = scene.cameras().cloned().collect();
         let up = Orbit::of(&cameras, focus).up;
@@ -91,7 +91,7 @@ impl ViewDirections {
         }
     }
 
-    pub(super) fn findings(&self, scene: &Scene<'_>) -> Vec<Diagnostic> {
+    pub(super) fn findings(&self, scene: &CameraSet<'_>) -> Vec<Diagnostic> {
         let mut findings = Vec::new();
         if scene.count() == 1 || scene.dataset.train.len() == 1 {
             findings.push(Diagnostic::warning(
@@ -129,7 +129,7 @@ impl ViewDirections {
     }
 
     /// Many pictures that do not stand upright, in any world direction.
-    fn rolled(&self, scene: &Scene<'_>) -> Option<Diagnostic> {
+    fn rolled(&self, scene: &CameraSet<'_>) -> Option<Diagnostic> {
         let axes: Vec<_> = scene.cameras().map(|camera| camera.world_from_camera.matrix3).collect();
         // Where a camera looks up or down, its picture has no upright.
         let is_rolled = |view: usize| {
@@ -151,7 +151,7 @@ impl ViewDirections {
     }
 }
 
-fn arrangement(scene: &Scene<'_>, up: DVec3) -> Arrangement {
+fn arrangement(scene: &CameraSet<'_>, up: DVec3) -> Arrangement {
     if scene.count() == 1 {
         return Arrangement::Single;
     }

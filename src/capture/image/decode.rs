@@ -21,15 +21,15 @@ use crate::photo::{BitDepth, Image, Pixels};
 /// What decoders may ask for beyond the pixels: metadata, colour profiles, lookup tables.
 const SPARE_BYTES: u64 = 64 << 20;
 
-/// The decoder that a file needs.
-pub(super) enum Kind {
+/// The kind of file, and with it the decoder that it needs.
+pub(super) enum FileFormat {
     /// One of the `image` crate.
     Common(ImageFormat),
     /// That of [`super::open_exr`].
     OpenExr,
 }
 
-impl Kind {
+impl FileFormat {
     pub(super) fn detect(path: &Path) -> Result<Self> {
         ensure!(!path.is_dir(), "expected an image file, found a folder");
         let mut magic = Vec::new();

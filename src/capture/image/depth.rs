@@ -8,7 +8,7 @@ use ::image::ImageFormat;
 use ::tiff::decoder::{Decoder, DecodingResult, Limits};
 use anyhow::{Context, Result, bail, ensure};
 
-use super::decode::Kind;
+use super::decode::FileFormat;
 use super::{check_size, decode, of_file, open_exr};
 use crate::photo::Pixels;
 
@@ -32,13 +32,13 @@ pub struct DepthMap {
 /// # Errors
 /// When the file cannot be read or holds a picture of depth in colours.
 pub fn load_depth(path: &Path) -> Result<DepthMap> {
-    let load = || match Kind::detect(path)? {
-        Kind::OpenExr => {
+    let load = || match FileFormat::detect(path)? {
+        FileFormat::OpenExr => {
             let (width, height, values) = open_exr::load_depth(path)?;
             Ok(DepthMap { width, height, values, is_integer: false })
         }
-        Kind::Common(ImageFormat::Tiff) => load_tiff(path),
-        Kind::Common(format) => load_grey(path, format),
+        FileFormat::Common(ImageFormat::Tiff) => load_tiff(path),
+        FileFormat::Common(format) => load_grey(path, format),
     };
     of_file(path, load)
 }

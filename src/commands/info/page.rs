@@ -1,6 +1,6 @@
 //! The report as text.
 
-use super::{Report, problems};
+use super::{Preflight, problems};
 use nerf::capture::dataset::Frame;
 use nerf::capture::diagnostics::Severity;
 use nerf::capture::health::{Arrangement, Spread, ViewDirections};
@@ -13,7 +13,7 @@ const MARGIN: usize = 10;
 /// Width of enumerations.
 const WIDTH: usize = 110;
 
-impl Report<'_> {
+impl Preflight<'_> {
     pub(super) fn text(&self) -> String {
         let sections = [
             ("dataset", self.about_dataset()),

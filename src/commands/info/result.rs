@@ -1,13 +1,13 @@
 //! The report as JSON.
 
 use super::page::bits;
-use super::{Report, problems};
+use super::{Preflight, problems};
 use nerf::capture::dataset::Frame;
 use nerf::capture::diagnostics::{Diagnostic, Severity};
 use nerf::capture::health::{Arrangement, Spread};
 use serde_json::{Value, json};
 
-impl Report<'_> {
+impl Preflight<'_> {
     /// Whether a training can begin.
     pub(super) fn is_ok(&self) -> bool {
         self.problems.iter().all(|problem| problem.severity != Severity::Error)

@@ -15,7 +15,7 @@ pub const COLOR_HIDDEN: [&str; 4] = ["color_hidden_1", "color_hidden_2", "color_
 
 /// How many samples get colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Selection {
+pub enum SelectionMode {
     /// Those above the weight floor, and some of the others.
     Training,
     /// Of a view's rays, one for every [`crate::field::Rounds`].
@@ -39,10 +39,12 @@ pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
 ///
 /// # Errors
 /// When a kernel cannot be built.
-pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
+pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: SelectionMode) -> Result<Vec<Stage>> {
     let (select, packing) = match selection {
-        Selection::Training => (plan.stage(gpu, workspace, &Link::of("select"), dispatch::RAYS)?, "training"),
-        Selection::View => (viewing::select(gpu, plan, workspace)?, "view"),
+        SelectionMode::Training => {
+            (plan.stage(gpu, workspace, &Link::of("select"), dispatch::RAYS)?, "training")
+        }
+        SelectionMode::View => (viewing::select(gpu, plan, workspace)?, "view"),
     };
     let kept = plan.stage(gpu, workspace, &Link::of("kept").with("packing", packing), dispatch::RAYS)?;
     let input = plan.stage(gpu, workspace, &Link::of("color input"), dispatch::KEPT)?;

@@ -27,7 +27,7 @@ pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
 
 /// How far rays are marched at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
+pub enum MarchExtent {
     /// To the end of the box.
     Whole,
     /// From where the round before ended, up to as many samples as the round allows: a
@@ -35,7 +35,7 @@ pub enum Extent {
     Round,
 }
 
-impl Extent {
+impl MarchExtent {
     fn variant(self) -> &'static str {
         match self {
             Self::Whole => "whole",
@@ -49,7 +49,7 @@ impl Extent {
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, jitter: bool) -> Result<Vec<Stage>> {
-    stages_over(gpu, plan, workspace, jitter, Extent::Whole)
+    stages_over(gpu, plan, workspace, jitter, MarchExtent::Whole)
 }
 
 /// As [`stages`], over an extent of the rays.
@@ -61,12 +61,12 @@ pub fn stages_over(
     plan: &Plan,
     workspace: &Workspace,
     jitter: bool,
-    extent: Extent,
+    extent: MarchExtent,
 ) -> Result<Vec<Stage>> {
     let jitter = if jitter { "on" } else { "off" };
     let over_rays = |label: &str| {
         let link = Link::of(label).with("jitter", jitter).with("extent", extent.variant());
-        let link = if extent == Extent::Round { link.with("distance", "depth") } else { link };
+        let link = if extent == MarchExtent::Round { link.with("distance", "depth") } else { link };
         plan.stage(gpu, workspace, &link, dispatch::RAYS)
     };
     Ok(vec![over_rays("march")?, scan(gpu, plan, workspace, Scanned::Samples)?, over_rays("samples")?])

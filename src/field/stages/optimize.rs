@@ -1,7 +1,7 @@
 //! From gradients to parameters: their range, the scatter into the table, and Adam, group by group.
 
 use crate::config::Accumulation;
-use crate::field::parameters::{GROUPS, Kernel, Learning};
+use crate::field::parameters::{AdamKernel, GROUPS, Learning};
 use crate::field::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
@@ -69,8 +69,8 @@ fn adam(
     let count = plan.arrays().find(|array| array.name == name).map_or(0, |array| array.count());
     Ok(match learning.kernel {
         // Two entries per thread.
-        Kernel::Table => Stage::wide(bind(Link::of_file(&label, "adam_table"), &[])?, count / 2 / 2),
-        Kernel::Dense(gradients) => {
+        AdamKernel::Table => Stage::wide(bind(Link::of_file(&label, "adam_table"), &[])?, count / 2 / 2),
+        AdamKernel::Dense(gradients) => {
             let [first, second] = learning.moments();
             let renamed = [
                 ("parameters", name),

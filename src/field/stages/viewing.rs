@@ -1,6 +1,6 @@
 //! What only rendering needs: its rays and their compositing.
 
-use crate::field::{Camera, Link, Plan, Progress, Workspace, dispatch};
+use crate::field::{DeviceCamera, Link, Plan, Progress, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
@@ -15,7 +15,7 @@ pub type Pixel = [f32; 5];
 pub fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let (rays, band) = (plan.capacity.rays, plan.rounds.band);
     vec![
-        BufferSpec::uniform::<Camera>("view_camera"),
+        BufferSpec::uniform::<DeviceCamera>("view_camera"),
         BufferSpec::uniform_storage::<Progress>("progress", 1),
         BufferSpec::storage::<[u32; 2]>("view_slots", rays),
         BufferSpec::storage::<[u32; 3]>("view_rays", rays),

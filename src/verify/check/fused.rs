@@ -3,10 +3,10 @@
 use super::inputs::Random;
 use super::stress_rays::StressRay;
 use super::{CheckResult, CheckedAdapter, Setup, Workbench};
+use crate::config::Transmittance;
 use crate::field::link::group_size;
 use crate::field::{Counters, composite};
 use crate::gpu::pass::Stage;
-use crate::verify::reference::Transmittance;
 use crate::verify::reference::composite::{CompositeInput, CompositeOutput};
 use crate::verify::reference::vectors::{Expected, GoldenFile, RayError};
 use anyhow::{Context, Result};

@@ -26,7 +26,7 @@ pub fn harmonics(adapter: &CheckedAdapter) -> Result<CheckResult> {
     bench.write("kept_rows", &rows);
     bench.set_counters(Counters { kept: count as u32, ..Counters::default() });
     bench.workspace.set_dispatch(&bench.gpu, dispatch::KEPT, count);
-    let stages = color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::Selection::Training)?;
+    let stages = color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::SelectionMode::Training)?;
     bench.run_only(&stages, "color input")?;
     let inputs: Vec<f32> = bench.read("color_input", count * COLOR_INPUTS)?;
     for (ray, (input, direction)) in inputs.chunks_exact(COLOR_INPUTS).zip(&directions).enumerate() {

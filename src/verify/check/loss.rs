@@ -3,9 +3,9 @@
 use super::inputs::Random;
 use super::workbench::KeptStep;
 use super::{CheckResult, CheckedAdapter, Setup};
+use crate::config::Transmittance;
 use crate::config::{ColorLoss, Loss};
 use crate::field::{Counters, composite};
-use crate::verify::reference::Transmittance;
 use crate::verify::reference::composite::{CompositeInput, CompositeOutput, optical_depths};
 use crate::verify::reference::loss::{Places, SPARSE_DENSITY, composite_with, distortion};
 use crate::verify::reference::model::Objective;
@@ -15,7 +15,7 @@ use anyhow::Result;
 const LEAST: f64 = 1e-30;
 
 /// A ray whose distances are known.
-struct Ray {
+struct KnownRay {
     s: Vec<f64>,
     delta: Vec<f64>,
     color: Vec<[f64; 3]>,
@@ -74,7 +74,8 @@ impl Case {
             (setup.config.batch.kept, setup.config.batch.samples) = (8192, 8192);
             let bench = adapter.workbench(setup)?;
             let mut random = Random::new(73);
-            let rays: Vec<_> = (0..200).map(|number| Ray::new(&mut random, number, self.distances)).collect();
+            let rays: Vec<_> =
+                (0..200).map(|number| KnownRay::new(&mut random, number, self.distances)).collect();
             let mut first = 0;
             let spans: Vec<[u32; 2]> = (rays.iter())
                 .map(|ray| {
@@ -102,8 +103,8 @@ impl Case {
     }
 }
 
-fn upload(bench: &super::Workbench, rays: &[Ray], spans: &[[u32; 2]]) {
-    let all = |value: fn(&Ray) -> Vec<[f32; 4]>| rays.iter().flat_map(value).collect::<Vec<_>>();
+fn upload(bench: &super::Workbench, rays: &[KnownRay], spans: &[[u32; 2]]) {
+    let all = |value: fn(&KnownRay) -> Vec<[f32; 4]>| rays.iter().flat_map(value).collect::<Vec<_>>();
     let step = |((&s, &delta), &distance): ((&f64, &f64), &f64)| {
         [[s as f32, delta as f32, 0.0, distance as f32], [1.0, 1.0, 0.0, 0.0]]
     };
@@ -121,7 +122,7 @@ fn narrow(values: [f64; 4]) -> [f32; 4] {
     values.map(|value| value as f32)
 }
 
-impl Ray {
+impl KnownRay {
     /// Every fifth ray has all its samples at one distance.
     fn new(random: &mut Random, number: usize, [nearest, farthest]: [f64; 2]) -> Self {
         let count = number * 7 % 61;

@@ -139,7 +139,7 @@ impl Marching {
             }
             packed += number;
             let start = if jitter { uniform(index, dimension::OFFSET) } else { 0.5 };
-            let ray = Ray { march, ray: self.rays[drawn(index, &pixels).0], start, words };
+            let ray = MarchedRay { march, ray: self.rays[drawn(index, &pixels).0], start, words };
             ray.compare(found, &samples[first..packed], &format!("{case}, ray {index}"));
         }
         let all = packed == samples.len()
@@ -164,14 +164,14 @@ pub(super) fn reference(bench: &Workbench) -> March {
 }
 
 /// A ray with what the reference needs to march it.
-struct Ray<'a> {
+struct MarchedRay<'a> {
     march: March,
     ray: BoxRay,
     start: f64,
     words: &'a [u32],
 }
 
-impl Ray<'_> {
+impl MarchedRay<'_> {
     /// Compares its samples: positions, and the length of the step.
     fn compare(&self, found: &mut Found, got: &[[f32; 4]], case: &str) {
         let Self { march, ray, start, words } = *self;

@@ -4,7 +4,7 @@
 use super::check_result::largest;
 use super::grid::positions;
 use super::inputs::{Random, random_batch};
-use super::{CheckResult, CheckedAdapter, Outcome, Setup, Workbench};
+use super::{CheckResult, CheckedAdapter, PassOutput, Setup, Workbench};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::activation::color;
 use crate::verify::reference::grid::grid_encode;
@@ -15,7 +15,7 @@ use glam::DVec3;
 
 /// The sizes of a field and its colours.
 #[derive(Clone, Copy, Debug)]
-pub struct Shape {
+pub struct FieldShape {
     /// Levels of the grid.
     pub levels: usize,
     /// Width of hidden layers.
@@ -29,11 +29,11 @@ pub struct Shape {
 }
 
 /// Shapes that use every part: those that are trained with by default, and a small one.
-pub const SHAPES: [Shape; 4] = [
-    Shape { levels: 8, width: 16, color_layers: 1, hdr: false, saturated: false },
-    Shape { levels: 16, width: 64, color_layers: 2, hdr: false, saturated: false },
-    Shape { levels: 8, width: 32, color_layers: 2, hdr: false, saturated: true },
-    Shape { levels: 8, width: 32, color_layers: 2, hdr: true, saturated: true },
+pub const SHAPES: [FieldShape; 4] = [
+    FieldShape { levels: 8, width: 16, color_layers: 1, hdr: false, saturated: false },
+    FieldShape { levels: 16, width: 64, color_layers: 2, hdr: false, saturated: false },
+    FieldShape { levels: 8, width: 32, color_layers: 2, hdr: false, saturated: true },
+    FieldShape { levels: 8, width: 32, color_layers: 2, hdr: true, saturated: true },
 ];
 
 /// What a batch leaves, each with its own bound.
@@ -49,7 +49,7 @@ struct NetworkResults {
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn networks(adapter: &CheckedAdapter, shapes: &[Shape]) -> Result<Vec<CheckResult>> {
+pub fn networks(adapter: &CheckedAdapter, shapes: &[FieldShape]) -> Result<Vec<CheckResult>> {
     let values = "sums of up to 64 terms in 2 layers round; relative to the largest value";
     let gradients = "sums over up to 130 samples and 5 layers round; relative to the largest gradient";
     let mut results = NetworkResults {
@@ -81,7 +81,7 @@ pub fn networks(adapter: &CheckedAdapter, shapes: &[Shape]) -> Result<Vec<CheckR
     Ok(vec![density, color, rays, weights, table])
 }
 
-fn workbench(adapter: &CheckedAdapter, shape: &Shape) -> Result<Workbench> {
+fn workbench(adapter: &CheckedAdapter, shape: &FieldShape) -> Result<Workbench> {
     let mut setup = Setup::tiny().network(shape.width, shape.color_layers).hdr(shape.hdr);
     setup.config.grid.levels = shape.levels;
     let bench = adapter.workbench(setup)?;
@@ -98,7 +98,7 @@ fn workbench(adapter: &CheckedAdapter, shape: &Shape) -> Result<Workbench> {
 }
 
 /// Batches of odd sizes; one of special positions, and one of which all samples share a cell.
-fn batches(shape: &Shape) -> Vec<(String, Vec<TrainingRay>)> {
+fn batches(shape: &FieldShape) -> Vec<(String, Vec<TrainingRay>)> {
     let mut random = Random::new(21);
     let sizes = [(3, 0), (1, 1), (2, 3), (9, 65), (33, 130)];
     let mut batches: Vec<_> = (sizes.into_iter())
@@ -166,7 +166,7 @@ impl NetworkResults {
     fn compare_weights<'a>(
         &mut self,
         case: &str,
-        got: &Outcome,
+        got: &PassOutput,
         want: impl Iterator<Item = &'a Vec<f64>>,
         most: f64,
     ) {

@@ -4,11 +4,11 @@ use super::Workbench;
 use super::inputs::Random;
 use crate::config::{self, Accumulation};
 use crate::field::layout::{FEATURES, Layer};
+use crate::verify::reference::ColorRange;
 use crate::verify::reference::grid::GridLevel;
 use crate::verify::reference::loss::Loss;
 use crate::verify::reference::mlp::{self, Mlp};
 use crate::verify::reference::model::{Model, Objective};
-use crate::verify::reference::{ColorRange, Transmittance};
 use anyhow::{Result, ensure};
 
 impl Workbench {
@@ -156,10 +156,7 @@ impl Workbench {
     /// What the plan minimises, as the reference takes it.
     #[must_use]
     pub fn objective(&self) -> Objective {
-        let transmittance = match self.plan.config.transmittance {
-            config::Transmittance::Exclusive => Transmittance::Exclusive,
-            config::Transmittance::Inclusive => Transmittance::Inclusive,
-        };
+        let transmittance = self.plan.config.transmittance;
         let color_range = if self.plan.features.hdr { ColorRange::Hdr } else { ColorRange::Ldr };
         let depth = if self.plan.features.depth { self.plan.config.loss.depth } else { 0.0 };
         let config::Loss { distortion, sparsity, .. } = self.plan.config.loss;

@@ -1,7 +1,7 @@
 //! Which samples get colour: select, scan and pack.
 
 use super::inputs::{Random, random_batch, uniform};
-use super::{CheckResult, CheckedAdapter, Kept, Setup, Workbench};
+use super::{CheckResult, CheckedAdapter, KeptSample, Setup, Workbench};
 use crate::field::{color, dimension};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::activation::{MAX_LOG_DENSITY, log_density};
@@ -87,7 +87,7 @@ impl Selecting {
     pub fn new(adapter: &CheckedAdapter, setup: Setup) -> Result<Self> {
         let bench = adapter.workbench(setup)?;
         let mut stages =
-            color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::Selection::Training)?;
+            color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::SelectionMode::Training)?;
         stages.truncate(STAGES);
         Ok(Self { bench, stages })
     }
@@ -203,7 +203,7 @@ struct Chosen<'a> {
     raw: &'a [f32],
     /// Its first sample.
     first: usize,
-    kept: &'a [Kept],
+    kept: &'a [KeptSample],
 }
 
 impl Chosen<'_> {

@@ -2,14 +2,12 @@
 
 use super::inputs::SEED;
 use crate::camera::Bounds;
-use crate::config::{
-    self, Accumulation, Batch, Config, Grid, March, Network, Occupancy, Optimizer, Selection,
-};
+use crate::config::Transmittance;
+use crate::config::{Accumulation, Batch, Config, Grid, March, Network, Occupancy, Optimizer, Selection};
 use crate::field::layer::Product;
 use crate::field::{Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
 use crate::gpu::tensor::TensorMemory;
-use crate::verify::reference::Transmittance;
 use anyhow::Result;
 use glam::DVec3;
 
@@ -87,10 +85,7 @@ impl Setup {
     /// In this convention.
     #[must_use]
     pub fn transmittance(mut self, transmittance: Transmittance) -> Self {
-        self.config.transmittance = match transmittance {
-            Transmittance::Exclusive => config::Transmittance::Exclusive,
-            Transmittance::Inclusive => config::Transmittance::Inclusive,
-        };
+        self.config.transmittance = transmittance;
         self
     }
 

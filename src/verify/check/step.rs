@@ -4,19 +4,19 @@ use super::check_result::largest;
 use super::inputs::Random;
 use super::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::camera::{Camera, Lens};
+use crate::config::Transmittance;
 use crate::config::{Background, Loss, Optimizer, Selection};
 use crate::field::layout::DENSITY_OUTPUTS;
 use crate::field::train::{StepStats, Trainer};
-use crate::field::views::Views;
+use crate::field::views::TrainingViews;
 use crate::field::{Field, RayTarget, STEP_GROWTH, STEP_SHRINKAGE, SceneFeatures};
 use crate::photo::Photo;
 use crate::photo::{Image, Pixels};
-use crate::verify::reference::Transmittance;
 use crate::verify::reference::activation::log_density;
 use crate::verify::reference::adam::Adam;
 use crate::verify::reference::composite::optical_depth;
 use crate::verify::reference::model::{BatchOutput, Model, RaySample, TrainingRay};
-use crate::verify::reference::step::Training;
+use crate::verify::reference::step::ModelTraining;
 use anyhow::Result;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -120,7 +120,7 @@ fn compare_moments(
     result: &mut CheckResult,
     name: &str,
     bench: &Workbench,
-    reference: &Training,
+    reference: &ModelTraining,
 ) -> Result<()> {
     let [first, _] = bench.table_moments()?;
     result.all(&format!("{name}: gradient of the table"), &first, &reference.table_moments.first);
@@ -137,7 +137,7 @@ fn compare_parameters(
     result: &mut CheckResult,
     name: &str,
     [before, now]: [&Model; 2],
-    reference: &Training,
+    reference: &ModelTraining,
     want: &BatchOutput,
 ) {
     let mut compare = |part: &str, got: &[f64], want: &[f64], gradient: &[f64]| {
@@ -180,7 +180,7 @@ impl TinyTraining {
         let photos: Vec<_> =
             cameras.iter().map(|camera| photo(&mut random, camera, &setup.features)).collect();
         let plan = setup.plan(&adapter.gpu)?;
-        let mut views = Views::new(&adapter.gpu, &plan, &cameras)?;
+        let mut views = TrainingViews::new(&adapter.gpu, &plan, &cameras)?;
         photos.iter().try_for_each(|photo| views.add(photo))?;
         let trainer = Trainer::new(Field::new(&adapter.gpu, plan)?, views)?;
         let bench = Workbench::of(trainer.field().clone(), trainer.workspace().clone())?;
@@ -191,9 +191,9 @@ impl TinyTraining {
     ///
     /// # Errors
     /// When the device was lost.
-    pub fn reference(&self) -> Result<Training> {
+    pub fn reference(&self) -> Result<ModelTraining> {
         let config = &self.bench.plan.config.optimizer;
-        let mut training = Training::new(self.bench.model()?, self.bench.objective());
+        let mut training = ModelTraining::new(self.bench.model()?, self.bench.objective());
         let constants = |l2, skip_zero| Adam {
             beta1: config.beta_1,
             beta2: config.beta_2,

@@ -1,7 +1,7 @@
 //! Rays on which compositing in single precision goes wrong where anything is done carelessly.
 
 use super::inputs::Random;
-use crate::verify::reference::Transmittance;
+use crate::config::Transmittance;
 use crate::verify::reference::composite::{CompositeInput, composite};
 use crate::verify::reference::vectors::{Expected, GoldenFile, GoldenRay};
 

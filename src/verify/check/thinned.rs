@@ -6,7 +6,7 @@ use super::fused::{BOUND, Fused, SAMPLES};
 use super::inputs::Random;
 use super::stress_rays::StressRay;
 use super::workbench::KeptStep;
-use crate::verify::reference::Transmittance;
+use crate::config::Transmittance;
 use crate::verify::reference::composite::{
     CompositeInput, CompositeOutput, opacity, optical_depths, transmittances,
 };

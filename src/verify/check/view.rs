@@ -5,9 +5,9 @@ use super::marching::reference;
 use super::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::camera::Bounds;
 use crate::camera::{Camera, Lens, LensKind};
+use crate::config::Transmittance;
 use crate::field::capacity::{LEAST_WEIGHT, Rounds};
 use crate::field::render::{Renderer, View};
-use crate::verify::reference::Transmittance;
 use crate::verify::reference::composite::{mean_depth, opacity, optical_depth, transmittances};
 use crate::verify::reference::lens;
 use crate::verify::reference::march::BoxRay;
@@ -54,7 +54,7 @@ pub fn rendered_views(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
         let mut bench = adapter.workbench(setup)?;
         bench.randomise(&mut Random::new(90), 2.0, 1.5)?;
         bench.write("occupancy_bits", &vec![u32::MAX; bench.plan.cell_count() / 32]);
-        let scene = Scene { camera: camera(&bounds, lens), bounds };
+        let scene = ViewedScene { camera: camera(&bounds, lens), bounds };
         scene.compare(&mut shared, &bench)?;
         bench.plan.rounds.color_weight = LEAST_WEIGHT;
         let view = scene.compare(&mut result, &bench)?;
@@ -66,7 +66,7 @@ pub fn rendered_views(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
 }
 
 /// What is seen, and from where.
-struct Scene {
+struct ViewedScene {
     bounds: Bounds,
     camera: Camera,
 }
@@ -92,7 +92,7 @@ fn camera(bounds: &Bounds, lens: Lens) -> Camera {
     }
 }
 
-impl Scene {
+impl ViewedScene {
     fn render(&self, bench: &Workbench) -> Result<View> {
         let Self { bounds, camera } = self;
         // With cascades the lens is chosen among all, without it is the only one.

@@ -39,7 +39,7 @@ pub(super) type KeptStep = [[f32; 4]; 2];
 
 /// A kept sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Kept {
+pub struct KeptSample {
     /// Which of the marched samples.
     pub sample: u32,
     /// Its ray.
@@ -56,7 +56,7 @@ pub struct Kept {
 
 /// What one pass over a batch left on the device.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct PassOutput {
     /// Raw outputs of the density network, `[samples, 16]`.
     pub density: Vec<f32>,
     /// Activated colours, `[kept, 3]`.
@@ -168,11 +168,11 @@ impl Workbench {
     ///
     /// # Errors
     /// When the device was lost.
-    pub fn kept(&self, count: usize) -> Result<Vec<Kept>> {
+    pub fn kept(&self, count: usize) -> Result<Vec<KeptSample>> {
         let rows: Vec<[u32; 2]> = self.read("kept_rows", count)?;
         let steps: Vec<KeptStep> = self.read("kept_steps", count)?;
         Ok((rows.into_iter().zip(steps))
-            .map(|([sample, ray], [[s, delta, gap, _], [first, second, ..]])| Kept {
+            .map(|([sample, ray], [[s, delta, gap, _], [first, second, ..]])| KeptSample {
                 sample,
                 ray,
                 s,
@@ -287,7 +287,7 @@ impl Workbench {
     pub fn stages(&self) -> Result<Vec<Stage>> {
         let (gpu, plan, workspace) = (&self.gpu, &self.plan, &self.workspace);
         let mut stages = density::stages(gpu, plan, workspace)?;
-        stages.extend(color::stages(gpu, plan, workspace, color::Selection::Training)?);
+        stages.extend(color::stages(gpu, plan, workspace, color::SelectionMode::Training)?);
         stages.push(composite::stage(gpu, plan, workspace, true)?);
         stages.extend(backward::stages(gpu, plan, workspace)?);
         stages.extend(backward::weights(gpu, plan, workspace)?);
@@ -299,13 +299,13 @@ impl Workbench {
     ///
     /// # Errors
     /// As [`Workbench::upload`] and [`Workbench::run`].
-    pub fn train(&self, stages: &[Stage], rays: &[TrainingRay]) -> Result<Outcome> {
+    pub fn train(&self, stages: &[Stage], rays: &[TrainingRay]) -> Result<PassOutput> {
         self.clear_table_moments();
         self.upload(rays)?;
         self.run(stages)?;
         let counters = self.counters()?;
         let [d_table, _] = self.table_moments()?;
-        Ok(Outcome {
+        Ok(PassOutput {
             density: self.density(counters.samples as usize)?,
             color: self.color(counters.kept as usize)?,
             rendered: self.results(counters.rays_used as usize)?.iter().map(|ray| ray.rendered).collect(),

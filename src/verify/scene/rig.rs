@@ -1,6 +1,6 @@
 //! Where the cameras of a generated dataset stand and what their lenses are.
 
-use super::{Generate, Scene};
+use super::{Scene, SceneOptions};
 use crate::camera::{Camera, Lens, LensKind};
 use glam::{DAffine3, DMat3, DVec2, DVec3, dvec2, dvec3};
 use std::f64::consts::TAU;
@@ -31,7 +31,7 @@ impl Split {
     }
 
     /// How many views `options` want of it.
-    pub(super) fn views(self, options: &Generate) -> usize {
+    pub(super) fn views(self, options: &SceneOptions) -> usize {
         match self {
             Self::Train => options.views.train,
             Self::Val => options.views.val,
@@ -41,8 +41,8 @@ impl Split {
 }
 
 /// The camera of view `index` of a split.
-pub(super) fn camera(scene: &Scene, options: &Generate, split: Split, index: usize) -> Camera {
-    let mut random = Random::new(options.seed, split);
+pub(super) fn camera(scene: &Scene, options: &SceneOptions, split: Split, index: usize) -> Camera {
+    let mut random = SplitMix64::new(options.seed, split);
     let kind = options.lenses[index % options.lenses.len()];
     let (width, height) = options.size;
     let size = dvec2(f64::from(width), f64::from(height));
@@ -101,7 +101,7 @@ fn lens(kind: LensKind) -> Lens {
 
 /// Evenly spread over the sphere without its poles, looking at the origin: the R2 sequence from a random start,
 /// so that any run of consecutive views is spread too.
-fn orbit(random: &mut Random, index: usize, radius: f64) -> DAffine3 {
+fn orbit(random: &mut SplitMix64, index: usize, radius: f64) -> DAffine3 {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     let step = index as f64;
     let angle = TAU * (random.unit() + step / PLASTIC).fract();
@@ -112,7 +112,7 @@ fn orbit(random: &mut Random, index: usize, radius: f64) -> DAffine3 {
 }
 
 /// A walk around the middle with a swaying hand: distance, height, aim and roll vary.
-fn handheld(random: &mut Random, index: usize, count: usize) -> DAffine3 {
+fn handheld(random: &mut SplitMix64, index: usize, count: usize) -> DAffine3 {
     let start = random.unit();
     random.skip(index);
     let mut sway = |size: f64| size * (2.0 * random.unit() - 1.0);
@@ -135,11 +135,11 @@ fn look_at(eye: DVec3, target: DVec3, roll_rad: f64) -> DAffine3 {
 }
 
 /// The SplitMix64 generator, one stream per seed and split.
-struct Random {
+struct SplitMix64 {
     state: u64,
 }
 
-impl Random {
+impl SplitMix64 {
     const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
     fn new(seed: u64, split: Split) -> Self {
@@ -169,11 +169,12 @@ impl Random {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Views;
+    use super::super::ViewCounts;
     use super::*;
 
     fn cameras(scene: &str, split: Split) -> Vec<Camera> {
-        let options = Generate { views: Views { train: 40, val: 5, test: 9 }, ..Generate::new(scene) };
+        let options =
+            SceneOptions { views: ViewCounts { train: 40, val: 5, test: 9 }, ..SceneOptions::new(scene) };
         let scene = Scene::named(scene).expect("a known scene");
         (0..split.views(&options)).map(|i| camera(&scene, &options, split, i)).collect()
     }
@@ -211,7 +212,7 @@ mod tests {
                 assert!(train.iter().all(apart));
             }
         }
-        let eye = |seed| orbit(&mut Random::new(seed, Split::Train), 0, ORBIT_RADIUS).translation;
+        let eye = |seed| orbit(&mut SplitMix64::new(seed, Split::Train), 0, ORBIT_RADIUS).translation;
         assert!(eye(0).distance(eye(1)) > 1e-3);
     }
 }

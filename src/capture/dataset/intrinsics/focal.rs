@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use anyhow::{Result, ensure};
 use glam::DVec2;
 
-use super::extent::Measure;
+use super::image_size::Measure;
 use crate::capture::dataset::json::{Fields, REMEDY};
 use crate::capture::dataset::notes::Notes;
 use crate::capture::diagnostics::Severity;

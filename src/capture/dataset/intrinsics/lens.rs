@@ -9,7 +9,7 @@ use crate::capture::diagnostics::Severity;
 
 /// What one object of a file says about the lens.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Stated {
+pub(super) struct StatedLens {
     projection: Option<Projection>,
     /// The name under which the projection is written, where it promises no distortion.
     undistorted: Option<&'static str>,
@@ -88,7 +88,7 @@ const REFUSED: [(&str, &str); 9] = [
 const ADVICE: &str =
     "undistort the images to PINHOLE, for example with COLMAP's image_undistorter, and use those cameras";
 
-impl Stated {
+impl StatedLens {
     pub(super) fn read(fields: Fields, owner: &str, notes: &mut Notes) -> Result<Self> {
         refuse_terms(fields)?;
         let model = model(fields)?;
@@ -120,7 +120,7 @@ impl Stated {
 
 /// The lens of the first object that names a projection, with the coefficients of the first that has any.
 pub(super) fn resolve<'a>(
-    layers: impl Iterator<Item = &'a Stated> + Clone,
+    layers: impl Iterator<Item = &'a StatedLens> + Clone,
     owner: &str,
     notes: &mut Notes,
 ) -> Lens {

@@ -5,7 +5,7 @@ use crate::narrator::Narrator;
 use crate::progress::{Progress, duration};
 use anyhow::{Context, Result};
 use nerf::config::schedule::Budget;
-use nerf::run::log::Stage;
+use nerf::run::log::StageTime;
 use nerf::run::{Evaluator, Means, Stepper};
 use serde::Serialize;
 
@@ -33,7 +33,7 @@ pub(super) struct Curve {
     /// device each, which costs a little.
     pub(super) timed_steps: u32,
     /// The time of each stage in those steps; none where the adapter has no timestamps.
-    pub(super) stages: Vec<Stage>,
+    pub(super) stages: Vec<StageTime>,
     /// In the order of time.
     pub(super) points: Vec<Point>,
 }

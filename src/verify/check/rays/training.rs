@@ -96,10 +96,10 @@ impl Photos {
             let pixels = 0..camera.width * camera.height;
             let counts: Vec<_> =
                 pixels.filter(|&pixel| photo.ignored.get(pixel as usize) != Some(&true)).collect();
-            on_device.push(field::Camera {
+            on_device.push(field::DeviceCamera {
                 first_row: (words.len() / ROW) as u32,
                 pixel_count: counts.len() as u32,
-                ..field::Camera::in_box(camera, &bench.plan.space)
+                ..field::DeviceCamera::in_box(camera, &bench.plan.space)
             });
             counting.push(counts);
             words.extend_from_slice(&record.of(photo, UNITS)?);

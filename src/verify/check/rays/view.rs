@@ -12,7 +12,7 @@ use anyhow::Result;
 use glam::{DVec2, DVec3};
 
 /// A lens, and what is to be said of it.
-struct Model {
+struct LensModel {
     name: &'static str,
     lens: Lens,
     /// Whether its rim lies within the image.
@@ -22,28 +22,28 @@ struct Model {
     is_steep: bool,
 }
 
-const fn model(name: &'static str, lens: Lens) -> Model {
-    Model { name, lens, has_rim: false, is_steep: false }
+const fn model(name: &'static str, lens: Lens) -> LensModel {
+    LensModel { name, lens, has_rim: false, is_steep: false }
 }
 
-const fn open_cv(name: &'static str, k: [f64; 4], p: [f64; 2]) -> Model {
+const fn open_cv(name: &'static str, k: [f64; 4], p: [f64; 2]) -> LensModel {
     model(name, Lens::OpenCv { k, p })
 }
 
-const fn fisheye(name: &'static str, k: [f64; 4]) -> Model {
+const fn fisheye(name: &'static str, k: [f64; 4]) -> LensModel {
     model(name, Lens::Fisheye { k })
 }
 
-const fn steep(model: Model) -> Model {
-    Model { is_steep: true, ..model }
+const fn steep(model: LensModel) -> LensModel {
+    LensModel { is_steep: true, ..model }
 }
 
-const fn with_rim(model: Model) -> Model {
-    Model { has_rim: true, ..model }
+const fn with_rim(model: LensModel) -> LensModel {
+    LensModel { has_rim: true, ..model }
 }
 
 /// Lenses of a phone and of an action camera, wide ones, strong barrels that fold within the image, and pincushions.
-const MODELS: [Model; 16] = [
+const MODELS: [LensModel; 16] = [
     model("pinhole", Lens::Pinhole),
     open_cv("no distortion", [0.0; 4], [0.0; 2]),
     open_cv("mild", [0.05, -0.08, 0.02, 0.0], [1e-3, -5e-4]),
@@ -74,10 +74,10 @@ pub fn view_rays(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
     let mut random = Random::new(40);
     let mixed = LensKind::ALL.to_vec();
     for linked in LensKind::ALL.map(|kind| vec![kind]).into_iter().chain([mixed]) {
-        let bench = Bench::new(adapter, &linked, 256)?;
+        let bench = ViewBench::new(adapter, &linked, 256)?;
         for model in MODELS.iter().filter(|model| linked.contains(&model.lens.kind())) {
             let camera = camera(&mut random, (17, 13), model.lens);
-            let none = View::new(model, camera, &bench).compare(&mut rays, &mut trips)?;
+            let none = BenchView::new(model, camera, &bench).compare(&mut rays, &mut trips)?;
             rays.holds(model.has_rim == (none > 0), || {
                 format!("{}: {none} pixels without a ray", model.name)
             });
@@ -98,10 +98,10 @@ pub fn sharp_rays(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
     );
     let mut angles = trips("lens: large images");
     let mut random = Random::new(42);
-    let bench = Bench::new(adapter, &LensKind::ALL, 1024)?;
+    let bench = ViewBench::new(adapter, &LensKind::ALL, 1024)?;
     for model in &MODELS {
         let camera = camera(&mut random, (1000, 750), model.lens);
-        View::new(model, camera, &bench).measure(&mut pixels, &mut angles)?;
+        BenchView::new(model, camera, &bench).measure(&mut pixels, &mut angles)?;
     }
     Ok(vec![pixels, angles])
 }
@@ -116,12 +116,12 @@ fn trips(name: &str) -> CheckResult {
 }
 
 /// A workbench for views of cameras with some lenses.
-struct Bench {
+struct ViewBench {
     bench: Workbench,
     stage: Stage,
 }
 
-impl Bench {
+impl ViewBench {
     fn new(adapter: &CheckedAdapter, lenses: &[LensKind], rays: usize) -> Result<Self> {
         let mut setup = Setup::tiny();
         setup.features.lenses = lenses.iter().copied().collect();
@@ -135,16 +135,16 @@ impl Bench {
 }
 
 /// A view on a workbench.
-struct View<'a> {
+struct BenchView<'a> {
     name: &'static str,
-    /// See [`Model::is_steep`].
+    /// See [`LensModel::is_steep`].
     is_steep: bool,
     camera: Camera,
-    bench: &'a Bench,
+    bench: &'a ViewBench,
 }
 
-impl<'a> View<'a> {
-    fn new(model: &Model, camera: Camera, bench: &'a Bench) -> Self {
+impl<'a> BenchView<'a> {
+    fn new(model: &LensModel, camera: Camera, bench: &'a ViewBench) -> Self {
         Self { name: model.name, is_steep: model.is_steep, camera, bench }
     }
 
@@ -220,8 +220,8 @@ impl<'a> View<'a> {
 
     /// The rays of `count` pixels from `first` on.
     fn draw(&self, first: usize, count: usize) -> Result<Vec<DeviceRay>> {
-        let Bench { bench, stage } = self.bench;
-        bench.write("view_camera", &[field::Camera::in_box(&self.camera, &bench.plan.space)]);
+        let ViewBench { bench, stage } = self.bench;
+        bench.write("view_camera", &[field::DeviceCamera::in_box(&self.camera, &bench.plan.space)]);
         begin_rays(bench, first..first + count);
         bench.run([stage])?;
         DeviceRay::read(bench, count)

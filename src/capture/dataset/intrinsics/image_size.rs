@@ -8,7 +8,7 @@ use crate::capture::diagnostics::{Diagnostic, Severity};
 
 /// Width and height in pixels as far as they are known; may be fractional.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Extent {
+pub(super) struct ImageSize {
     width: Option<f64>,
     height: Option<f64>,
     origin: Origin,
@@ -26,7 +26,7 @@ enum Origin {
     Center,
 }
 
-impl Extent {
+impl ImageSize {
     pub(super) fn read(fields: Fields) -> Result<Self> {
         let mut known = Self::default();
         for (width, height) in [("w", "h"), ("width", "height"), ("image_width", "image_height")] {
@@ -81,7 +81,7 @@ impl Extent {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Measure {
     pub(super) px: DVec2,
-    pub(super) size: Extent,
+    pub(super) size: ImageSize,
 }
 
 impl Measure {

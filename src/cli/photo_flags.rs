@@ -2,12 +2,12 @@
 
 use super::one_of::OneOf;
 use clap::Args;
-use nerf::photo::{AlphaMode, Crop, Reading as Settings};
+use nerf::photo::{AlphaMode, Crop, Reading};
 
-/// How photos are read; what is not said stays as it is.
+/// How photos are read; a flag that is left out changes nothing.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "How photos are read")]
-pub(crate) struct Reading {
+pub(crate) struct PhotoFlags {
     /// What colours are multiplied with in photos with transparency [default: auto]
     #[arg(long, value_parser = alphas())]
     alpha: Option<AlphaMode>,
@@ -35,10 +35,10 @@ fn alphas() -> OneOf<AlphaMode> {
     ])
 }
 
-impl Reading {
+impl PhotoFlags {
     /// `settings`, changed as the command line says.
-    pub(crate) fn over(&self, settings: Settings) -> Settings {
-        Settings {
+    pub(crate) fn over(&self, settings: Reading) -> Reading {
+        Reading {
             alpha: self.alpha.unwrap_or(settings.alpha),
             downscale: self.downscale.unwrap_or(settings.downscale),
             crop: self.crop.unwrap_or(settings.crop),
@@ -73,9 +73,9 @@ mod tests {
 
     #[test]
     fn what_is_not_said_stays() {
-        let settings = Settings { downscale: 4, invert_masks: true, ..Settings::default() };
-        assert_eq!(Reading::default().over(settings.clone()), settings);
-        let said = Reading { downscale: Some(2), invert_masks: Some(false), ..Reading::default() };
-        assert_eq!(said.over(settings), Settings { downscale: 2, ..Settings::default() });
+        let settings = Reading { downscale: 4, invert_masks: true, ..Reading::default() };
+        assert_eq!(PhotoFlags::default().over(settings.clone()), settings);
+        let said = PhotoFlags { downscale: Some(2), invert_masks: Some(false), ..PhotoFlags::default() };
+        assert_eq!(said.over(settings), Reading { downscale: 2, ..Reading::default() });
     }
 }
