@@ -12,7 +12,7 @@ use anyhow::{Context, Result, ensure};
 use image::{ImageBuffer, ImageFormat, Rgb};
 use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions};
 use nerf::config::Config;
-use nerf::field::train::Trainer;
+use nerf::field::trainer::Trainer;
 use nerf::field::{Field, Plan};
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::Reading;

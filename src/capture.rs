@@ -4,5 +4,5 @@ pub mod dataset;
 pub mod diagnostics;
 pub(crate) mod focus;
 pub mod health;
-pub mod image;
+pub mod image_file;
 pub(crate) mod scene_box;

@@ -15,15 +15,15 @@ pub mod link;
 pub mod parameters;
 mod plan;
 pub mod records;
-pub mod render;
+pub mod renderer;
 mod shared;
 pub mod silhouette;
 mod space;
 pub mod stages;
 pub mod state;
-pub mod train;
+pub mod trainer;
+pub mod training_views;
 mod variants;
-pub mod views;
 pub mod visibility;
 mod workspace;
 

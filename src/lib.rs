@@ -75,8 +75,8 @@ pub use camera::{Bounds, Camera, Lens, LensKind};
 pub use config::Config;
 pub use field::Field;
 pub use field::checkpoint::Checkpoint;
-pub use field::render::{Renderer, View};
-pub use field::train::{StepStats, Trainer};
+pub use field::renderer::{Renderer, View};
+pub use field::trainer::{StepStats, Trainer};
 pub use gpu::Gpu;
 pub use photo::{Image, Photo};
 

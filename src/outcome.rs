@@ -1,6 +1,6 @@
 //! What test views say, in words and as entries of a result.
 
-use nerf::run::report::views::Outcome;
+use nerf::run::report::test_views::Outcome;
 use nerf::support::format::percent;
 use serde_json::{Value, json};
 

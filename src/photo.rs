@@ -1,6 +1,6 @@
 //! Photos as plain values: pixels, masks, depth, and how they are to be read. No files.
 
-pub mod color;
+pub mod color_space;
 mod image;
 mod reading;
 mod split;

@@ -17,7 +17,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::{Parser, ValueEnum};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::config::Config;
-use nerf::field::train::{StepStats, Trainer};
+use nerf::field::trainer::{StepStats, Trainer};
 use nerf::field::{Field, Plan};
 use nerf::gpu::timer::Timer;
 use nerf::gpu::{Gpu, adapter};

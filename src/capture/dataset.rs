@@ -11,7 +11,7 @@ mod listing;
 pub(crate) mod notes;
 mod open;
 mod part;
-mod photo;
+mod photo_source;
 mod pose;
 mod prefetch;
 mod resolved_frames;
@@ -92,7 +92,7 @@ pub struct Frame {
     pub has_depth: bool,
     /// Whether the alpha is in the image file.
     has_own_alpha: bool,
-    source: photo::PhotoSource,
+    source: photo_source::PhotoSource,
 }
 
 /// Choices when opening a dataset.

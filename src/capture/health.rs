@@ -1,13 +1,13 @@
 //! What is healthy or wrong about a dataset, seen from its cameras and pixels before anything is trained.
 //!
-//! [`Survey`] looks at cameras and scene box, [`photos::Look`] at one photo and [`photos::Gallery`] at all of them,
+//! [`Survey`] looks at cameras and scene box, [`gallery::Look`] at one photo and [`gallery::Gallery`] at all of them,
 //! and [`map`] draws the cameras. Every [`Diagnostic`] says what is wrong, how it was seen, and what to do.
 
 mod axis_convention;
 mod coverage;
+pub mod gallery;
 pub mod map;
 mod optics;
-pub mod photos;
 mod poses;
 mod spread;
 mod view_directions;
@@ -21,8 +21,8 @@ pub use view_directions::{Arrangement, ViewDirections};
 use crate::camera::Camera;
 use crate::capture::dataset::Dataset;
 use crate::capture::focus::{Focus, OpticalAxis, find};
+use gallery::Gallery;
 use glam::DVec3;
-use photos::Gallery;
 
 /// What the cameras of a dataset tell.
 #[derive(Clone, Debug)]

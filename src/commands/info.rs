@@ -1,8 +1,8 @@
 //! `nerf info`: what a training would make of a dataset, before it takes a night.
 
-mod page;
+mod json_report;
 mod problems;
-mod result;
+mod text_report;
 
 use super::{Failed, Session};
 use crate::cli::info::Info;
@@ -12,8 +12,8 @@ use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::diagnostics::{Diagnostic, Severity};
 use nerf::capture::health::Survey;
+use nerf::capture::health::gallery::{Gallery, Look};
 use nerf::capture::health::map;
-use nerf::capture::health::photos::{Gallery, Look};
 use nerf::photo::Reading;
 use nerf::run::Estimate;
 use nerf::support::file::write_atomically;

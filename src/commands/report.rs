@@ -7,7 +7,7 @@ use crate::outcome;
 use anyhow::{Result, ensure};
 use nerf::camera::LensKind;
 use nerf::capture::dataset::Dataset;
-use nerf::run::report::views::TestViews;
+use nerf::run::report::test_views::TestViews;
 use nerf::run::report::{Facts, Report};
 use nerf::run::{Evaluator, RunFolder, TrainedField};
 use serde_json::json;

@@ -11,7 +11,7 @@ use nerf::capture::diagnostics::Severity;
 use nerf::capture::health::Survey;
 use nerf::config::schedule::Budget;
 use nerf::field::checkpoint::{Checkpoint, Metadata};
-use nerf::run::report::views::TestViews;
+use nerf::run::report::test_views::TestViews;
 use nerf::run::{
     EvaluationAtEnd, EvaluationOptions, NoTestViews, Resolved, RunFolder, TrainOptions, TrainingEnd,
     TrainingRun,

@@ -7,7 +7,7 @@
 pub use super::onlookers::Onlookers;
 use crate::camera::Camera;
 use crate::capture::focus::median;
-use crate::field::render::View;
+use crate::field::renderer::View;
 use crate::support::format::percent;
 use glam::DVec2;
 use std::iter::Sum;

@@ -1,7 +1,7 @@
 //! How much memory a training on a dataset would take, before anything is loaded.
 
 use super::memory::MemoryUse;
-use super::photos::TrainingPhotos;
+use super::training_photos::TrainingPhotos;
 use crate::capture::dataset::Dataset;
 use crate::config::Config;
 use crate::field::{Capabilities, Plan, SceneFeatures, Space};

@@ -2,7 +2,7 @@
 
 use crate::camera::Camera;
 use crate::field::Plan;
-use crate::field::render::Renderer;
+use crate::field::renderer::Renderer;
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::paged_array::PageCapacity;

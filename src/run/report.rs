@@ -9,8 +9,8 @@ mod distances;
 mod measure;
 mod page;
 pub mod pictures;
+pub mod test_views;
 mod time;
-pub mod views;
 
 use crate::field::checkpoint::Metadata;
 use crate::run::log::Log;
@@ -19,7 +19,7 @@ use anyhow::{Context, Result};
 use std::io::Write;
 use std::path::Path;
 use std::time::SystemTime;
-use views::{Outcome, TestViews};
+use test_views::{Outcome, TestViews};
 
 /// What is known about a training; everything may be missing.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -2,21 +2,21 @@
 
 use super::evaluate::Evaluator;
 use super::event::{Event, Observer};
-use super::features::NO_FRAME;
 use super::options::TrainOptions;
-use super::photos::TrainingPhotos;
+use super::scene_features::NO_FRAME;
+use super::training_photos::TrainingPhotos;
 use crate::camera::orbit::Orbit;
 use crate::capture::dataset::{Dataset, evenly_spaced};
 use crate::config::Config;
 use crate::config::schedule::Budget;
 use crate::field::checkpoint::{Checkpoint, FORMAT, Metadata, SplitNames};
 use crate::field::layout::{Layout, finest_resolution};
-use crate::field::render::Renderer;
+use crate::field::renderer::Renderer;
 use crate::field::state::State;
 use crate::field::{Capabilities, Field, Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
 use crate::photo::Reading;
-use crate::photo::color::ColorSpace;
+use crate::photo::color_space::ColorSpace;
 use crate::support::format::few;
 use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Result, bail, ensure};

@@ -1,7 +1,7 @@
 //! How well views are rendered: one by one, and on average.
 
 use super::depths::Depths;
-use super::report::views::ViewScores;
+use super::report::test_views::ViewScores;
 use serde::{Serialize, Serializer};
 
 /// How well one view is rendered.

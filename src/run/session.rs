@@ -16,7 +16,7 @@ use crate::capture::dataset::Dataset;
 use crate::config::schedule::Budget;
 use crate::field::Field;
 use crate::field::checkpoint::{Checkpoint, Metadata};
-use crate::field::train::Trainer;
+use crate::field::trainer::Trainer;
 use crate::gpu::Gpu;
 use crate::support::file::writable_folder;
 use crate::support::metrics::PSNR_CAP_DB;

@@ -3,7 +3,7 @@
 use super::clock::StepClock;
 use super::stage_times::StageTimes;
 use crate::config::schedule::Budget;
-use crate::field::train::{StepStats, Trainer};
+use crate::field::trainer::{StepStats, Trainer};
 use anyhow::{Result, bail};
 use std::time::Instant;
 

@@ -3,9 +3,9 @@
 use crate::camera::LensKind;
 use crate::field::Field;
 use crate::field::checkpoint::{self, Checkpoint, Metadata};
-use crate::field::render::Renderer;
+use crate::field::renderer::Renderer;
 use crate::gpu::Gpu;
-use crate::photo::color::ColorSpace;
+use crate::photo::color_space::ColorSpace;
 use anyhow::Result;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -11,6 +11,7 @@ pub mod activation;
 pub mod adam;
 mod check_result;
 mod checked_adapter;
+mod device_parameters;
 pub mod exponential;
 pub mod fused;
 pub mod grid;
@@ -21,16 +22,15 @@ pub mod loss;
 pub mod marching;
 pub mod networks;
 pub mod occupancy;
-mod parameters;
 mod probe;
 pub mod random;
 pub mod rays;
+pub mod rendered_view;
 pub mod selection;
 mod setup;
 pub mod step;
 pub mod stress_rays;
 pub mod thinned;
-pub mod view;
 mod workbench;
 
 pub use check_result::CheckResult;
@@ -77,7 +77,7 @@ fn compositing(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
 fn whole(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
     let setups = step::setups();
     let step = step::one_step(adapter, &setups[2..])?;
-    Ok([vec![step], view::rendered_views(adapter)?].concat())
+    Ok([vec![step], rendered_view::rendered_views(adapter)?].concat())
 }
 
 /// Runs every check; `progress` is told how many are done, how many there are, and which one is next.

@@ -16,7 +16,7 @@ mod toys;
 mod world;
 
 use crate::camera::LensKind;
-use crate::photo::color::srgb_from_linear;
+use crate::photo::color_space::srgb_from_linear;
 use anyhow::{Result, bail};
 use fog::Fog;
 use glam::{DVec3, dvec3};

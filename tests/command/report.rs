@@ -7,11 +7,11 @@ use crate::support::folder;
 use glam::{DAffine3, DVec2, DVec3};
 use nerf::camera::{Camera, Lens};
 use nerf::capture::dataset::spread_order;
-use nerf::field::render::View;
+use nerf::field::renderer::View;
 use nerf::run::depths::{Depths, Onlookers};
 use nerf::run::log::Log;
 use nerf::run::report::pictures::{LONGEST_SIDE, Pair, Pictures};
-use nerf::run::report::views::{Outcome, TestViews, ViewScores};
+use nerf::run::report::test_views::{Outcome, TestViews, ViewScores};
 use nerf::run::report::{Facts, Report};
 
 /// A log with every kind of row, and a torn last line.

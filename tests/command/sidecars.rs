@@ -9,7 +9,7 @@ mod reading;
 
 use crate::program::{SMOKE, checkpoint, generated, nerf, number, place, quietly, text, train};
 use crate::support::files;
-use nerf::capture::image::{ExrPixels, Precision, read_exr_channel, write_exr, write_png_rgba8};
+use nerf::capture::image_file::{ExrPixels, Precision, read_exr_channel, write_exr, write_png_rgba8};
 use nerf::photo::{Image, Pixels};
 use serde_json::{Value, json};
 use std::fs;

@@ -3,10 +3,10 @@
 use crate::program::{SMOKE, checkpoint, generated, number, object, place, quietly, rows, text, train};
 use nerf::camera::LensKind;
 use nerf::capture::dataset::{Dataset, OpenOptions};
-use nerf::capture::image::read_exr_channel;
+use nerf::capture::image_file::read_exr_channel;
 use nerf::config::Config;
 use nerf::config::schedule::Budget;
-use nerf::field::train::Trainer;
+use nerf::field::trainer::Trainer;
 use nerf::gpu::{Gpu, adapter};
 use nerf::run::{
     EvaluationAtEnd, EvaluationOptions, Event, NoTestViews, Observer, Resolved, RunFolder, TrainOptions,

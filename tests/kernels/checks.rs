@@ -8,7 +8,7 @@ use nerf::gpu::tensor::TensorMemory;
 use nerf::verify::check::networks::{FieldShape, SHAPES, networks};
 use nerf::verify::check::{
     Forced, activation, adam, exponential, fused, grid, harmonics, lens, loss, marching, occupancy, random,
-    rays, selection, step, thinned, view,
+    rays, rendered_view, selection, step, thinned,
 };
 
 use crate::bench::{adapter, adapter_with, modest_adapter, passes};
@@ -126,7 +126,7 @@ fn one_step() -> Result<()> {
 
 #[test]
 fn rendered_views() -> Result<()> {
-    passes(view::rendered_views(&adapter()?)?);
+    passes(rendered_view::rendered_views(&adapter()?)?);
     Ok(())
 }
 
@@ -189,7 +189,7 @@ fn tensors_in_buffers() -> Result<()> {
     passes(vec![thinned::thinned_rays(&adapter)?]);
     passes(adam::adam(&adapter)?);
     passes([occupancy::occupancy_update(&adapter)?]);
-    passes(view::rendered_views(&adapter)?);
+    passes(rendered_view::rendered_views(&adapter)?);
     passes([rays::training_rays(&adapter)?]);
     passes(loss::further_terms(&adapter)?);
     let setups = step::setups();
@@ -203,6 +203,6 @@ fn what_webgpu_guarantees_is_enough() -> Result<()> {
     let adapter = modest_adapter()?;
     passes([rays::training_rays(&adapter)?, step::one_step(&adapter, &step::setups())?]);
     passes(loss::further_terms(&adapter)?);
-    passes(view::rendered_views(&adapter)?);
+    passes(rendered_view::rendered_views(&adapter)?);
     Ok(())
 }

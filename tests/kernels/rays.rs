@@ -3,7 +3,7 @@
 use anyhow::Result;
 use glam::{DAffine3, DVec2, DVec3};
 use nerf::camera::{Camera, Lens, LensKind};
-use nerf::field::render::Renderer;
+use nerf::field::renderer::Renderer;
 use nerf::field::viewing;
 use nerf::verify::check::Setup;
 use nerf::verify::check::rays::{DeviceRay, begin_rays, pixel_camera};

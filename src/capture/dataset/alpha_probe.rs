@@ -5,10 +5,10 @@ use rayon::prelude::*;
 
 use super::Frame;
 use super::notes::Notes;
-use super::photo::How;
+use super::photo_source::How;
 use super::splits::evenly_spaced;
 use crate::capture::diagnostics::Severity;
-use crate::capture::image::{Evidence, Multiplied};
+use crate::capture::image_file::{Evidence, Multiplied};
 use crate::capture::scene_box::Surroundings;
 use crate::photo::BitDepth;
 use crate::photo::{AlphaMode, Reading};

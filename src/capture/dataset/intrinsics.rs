@@ -3,7 +3,7 @@
 mod calibration;
 mod focal;
 mod image_size;
-mod lens;
+mod lens_model;
 
 use std::f64::consts::{PI, TAU};
 
@@ -38,7 +38,7 @@ pub(super) struct Stated {
     focal_px: Option<DVec2>,
     angles: Angles,
     center_px: Option<DVec2>,
-    lens: lens::StatedLens,
+    lens: lens_model::StatedLens,
 }
 
 impl Stated {
@@ -50,7 +50,7 @@ impl Stated {
             focal_px: focal::pixels(fields)?.or(matrix.map(|matrix| matrix.focal_px)),
             angles: Angles::read(fields, owner, notes)?,
             center_px: center(fields)?.or(matrix.and_then(|matrix| matrix.center_px)),
-            lens: lens::StatedLens::read(fields, owner, notes)?,
+            lens: lens_model::StatedLens::read(fields, owner, notes)?,
         })
     }
 }
@@ -58,7 +58,7 @@ impl Stated {
 impl Intrinsics {
     /// Chooses from what is stated, in falling priority: the frame, what is nested in it, the file.
     pub(super) fn resolve(layers: &[&Stated], owner: &str, notes: &mut Notes) -> Result<Self> {
-        let lens = lens::resolve(layers.iter().map(|layer| &layer.lens), owner, notes);
+        let lens = lens_model::resolve(layers.iter().map(|layer| &layer.lens), owner, notes);
         let declared = layers.iter().fold(ImageSize::default(), |known, layer| known.or(layer.size));
         let size_of = |layer: &Stated| layer.size.or(declared).or(layer.implied_size());
         let center =

@@ -9,12 +9,12 @@ use rayon::prelude::*;
 
 use super::listing::{FrameEntry, Listing};
 use super::notes::Notes;
-use super::photo::PhotoSource;
+use super::photo_source::PhotoSource;
 use super::sidecars::{Finder, Sidecars};
 use super::{Frame, OpenOptions, Split, frames};
 use crate::capture::diagnostics::Severity;
-use crate::capture::image::Turn;
-use crate::capture::image::{FORMATS, Header};
+use crate::capture::image_file::Turn;
+use crate::capture::image_file::{FORMATS, Header};
 use crate::photo::BitDepth;
 use crate::photo::Reading;
 use crate::support::format::few;

@@ -22,7 +22,7 @@ use super::json::Fields;
 use super::listing::{DepthEntry, FrameEntry};
 use super::notes::Notes;
 use crate::capture::diagnostics::Severity;
-use crate::capture::image::Header;
+use crate::capture::image_file::Header;
 use crate::photo::BitDepth;
 
 /// The files beside one photo.

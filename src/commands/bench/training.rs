@@ -11,7 +11,7 @@ use curve::{Curve, follow};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::config::schedule::Budget;
 use nerf::field::Field;
-use nerf::field::train::Trainer;
+use nerf::field::trainer::Trainer;
 use nerf::gpu::Gpu;
 use nerf::run::results::{
     circumstances, joined, markdown, optional, quoted, write_csv, write_json, write_text,
@@ -29,7 +29,7 @@ const CLOCK: &str = "training alone, without loading, compiling and measuring; t
                      for the device each, so that their stages can be timed";
 
 /// One training to be measured.
-struct Planned {
+struct PlannedRun {
     /// The stem of its config's file.
     config: String,
     resolved: Resolved,
@@ -37,7 +37,7 @@ struct Planned {
 
 /// One training that was measured.
 #[derive(Serialize)]
-struct Measured {
+struct MeasuredRun {
     config: String,
     seed: u32,
     /// Decoding the photos and putting them on the device.
@@ -95,7 +95,7 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
 }
 
 /// Every config with every seed, all checked before any of them is run.
-fn plan(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<Planned>> {
+fn plan(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<PlannedRun>> {
     let mut configs = Vec::new();
     for path in &args.config {
         let stem =
@@ -128,14 +128,14 @@ fn plan(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<Planned>> {
             budget,
             ..TrainOptions::default()
         };
-        Ok(Planned { config: name.clone(), resolved: Resolved::new_run(&options, dataset, gpu)? })
+        Ok(PlannedRun { config: name.clone(), resolved: Resolved::new_run(&options, dataset, gpu)? })
     };
     each.map(run).collect()
 }
 
 impl Benchmark<'_> {
     /// Trains and measures once.
-    fn run(&self, planned: &Planned, session: &Session<'_>) -> Result<Measured> {
+    fn run(&self, planned: &PlannedRun, session: &Session<'_>) -> Result<MeasuredRun> {
         let resolved = &planned.resolved;
         let mut narrator = session.narrator();
         resolved.check_memory(&self.gpu, self.dataset, &mut narrator)?;
@@ -152,7 +152,7 @@ impl Benchmark<'_> {
         let stepper = Stepper::new(trainer, StepClock::new(&resolved.metadata, 0.0));
         let curve = follow(stepper, &mut evaluator, &resolved.test, session.console)?;
         let settings = resolved.metadata.config.clone();
-        Ok(Measured {
+        Ok(MeasuredRun {
             config: planned.config.clone(),
             seed: settings.seed,
             load_seconds,
@@ -164,7 +164,7 @@ impl Benchmark<'_> {
     }
 }
 
-fn write(folder: &Path, about: &Value, runs: &[Measured]) -> Result<()> {
+fn write(folder: &Path, about: &Value, runs: &[MeasuredRun]) -> Result<()> {
     let whole = joined(about.clone(), json!({ "configs": summaries(runs), "runs": runs }));
     write_json(&folder.join("training.json"), &whole)?;
     let rows = runs.iter().flat_map(|run| run.curve.points.iter().map(move |point| (run, point)));
@@ -187,7 +187,7 @@ fn write(folder: &Path, about: &Value, runs: &[Measured]) -> Result<()> {
 }
 
 /// The runs of one config.
-fn by_config(runs: &[Measured]) -> impl Iterator<Item = &[Measured]> {
+fn by_config(runs: &[MeasuredRun]) -> impl Iterator<Item = &[MeasuredRun]> {
     runs.chunk_by(|a, b| a.config == b.config)
 }
 
@@ -199,9 +199,9 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, Option<f64>) {
     (mean, (count > 1.0).then(|| (squares / (count - 1.0)).sqrt()))
 }
 
-fn summaries(runs: &[Measured]) -> Vec<Value> {
-    let summary = |runs: &[Measured]| {
-        let mean = |value: fn(&Measured) -> f64| spread(runs.iter().map(value)).0;
+fn summaries(runs: &[MeasuredRun]) -> Vec<Value> {
+    let summary = |runs: &[MeasuredRun]| {
+        let mean = |value: fn(&MeasuredRun) -> f64| spread(runs.iter().map(value)).0;
         let (psnr, psnr_spread) = spread(runs.iter().map(|run| run.curve.psnr));
         json!({
             "config": runs[0].config,
@@ -220,7 +220,7 @@ fn summaries(runs: &[Measured]) -> Vec<Value> {
     by_config(runs).map(summary).collect()
 }
 
-fn table(runs: &[Measured]) -> String {
+fn table(runs: &[MeasuredRun]) -> String {
     let header = [
         "config",
         "seeds",
@@ -233,8 +233,8 @@ fn table(runs: &[Measured]) -> String {
         "compiling, s",
         "measuring, s",
     ];
-    let row = |runs: &[Measured]| {
-        let mean = |value: fn(&Measured) -> f64| spread(runs.iter().map(value)).0;
+    let row = |runs: &[MeasuredRun]| {
+        let mean = |value: fn(&MeasuredRun) -> f64| spread(runs.iter().map(value)).0;
         let (psnr, deviation) = spread(runs.iter().map(|run| run.curve.psnr));
         vec![
             runs[0].config.clone(),

@@ -3,7 +3,7 @@
 use super::colormap::{VIRIDIS, gradient};
 use super::curves::SIZE;
 use super::pictures::nearness;
-use super::views::TestViews;
+use super::test_views::TestViews;
 use crate::run::depths::{Bin, Depths, NEAR};
 use crate::support::chart::{Axis, Chart, Mark, Series};
 use crate::support::format::percent;

@@ -2,7 +2,7 @@
 
 use super::colormap::{INFERNO, gradient};
 use super::pictures::{ERROR_SCALE, LONGEST_SIDE};
-use super::views::{EVENLY_SPACED, Row, TestViews, WORST};
+use super::test_views::{EVENLY_SPACED, Row, TestViews, WORST};
 use super::{Report, curves, distances, time};
 use crate::run::depths::{Depths, fog};
 use crate::run::log::Start;

@@ -5,7 +5,7 @@ use crate::field::checkpoint::Metadata;
 use crate::run::event::Observer;
 use crate::run::log::{self, LogRow};
 use crate::run::options::EvaluationAtEnd;
-use crate::run::report::views::TestViews;
+use crate::run::report::test_views::TestViews;
 use crate::run::report::{Facts, Report};
 use anyhow::Result;
 use std::path::PathBuf;

@@ -1,10 +1,10 @@
 //! Rays through pixels: those of a view through every lens, and those of a training with their targets.
 
-mod training;
-mod view;
+mod training_rays;
+mod view_rays;
 
-pub use training::{drawn, training_rays};
-pub use view::{sharp_rays, view_rays};
+pub use training_rays::{drawn, training_rays};
+pub use view_rays::{sharp_rays, view_rays};
 
 use super::Workbench;
 use super::inputs::Random;

@@ -1,10 +1,11 @@
 //! Writes a generated dataset: the images of each split, then its `transforms_*.json`.
 
 use super::picture::{RenderedImage, render};
-use super::rig::{ORBIT_FOV_RAD, Split, camera};
+use super::rig::{ORBIT_FOV_RAD, SPLITS, camera, view_count};
 use super::{Scene, SceneOptions, Summary};
 use crate::camera::{Camera, Lens, LensKind};
-use crate::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use crate::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use crate::photo::Split;
 use crate::support::file::write_atomically;
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
@@ -22,12 +23,12 @@ pub(super) fn write(
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Summary> {
     claim(out)?;
-    let views: Vec<GeneratedView> = Split::ALL
+    let views: Vec<GeneratedView> = SPLITS
         .into_iter()
-        .flat_map(|split| (0..split.views(options)).map(move |index| (split, index)))
+        .flat_map(|split| (0..view_count(options, split)).map(move |index| (split, index)))
         .map(|(split, index)| GeneratedView { split, index, camera: camera(scene, options, split, index) })
         .collect();
-    for split in Split::ALL {
+    for split in SPLITS {
         let folder = out.join(split.name());
         fs::create_dir_all(&folder).with_context(|| format!("creating {}", folder.display()))?;
     }
@@ -38,12 +39,12 @@ pub(super) fn write(
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         anyhow::Ok(())
     })?;
-    for split in Split::ALL {
+    for split in SPLITS {
         let frames = views.iter().filter(|view| view.split == split);
         let listing = listing(scene, options, frames);
         write_json(&out.join(format!("transforms_{}.json", split.name())), &listing)?;
     }
-    let files = 2 * views.len() + Split::ALL.len();
+    let files = 2 * views.len() + SPLITS.len();
     Ok(Summary { scene: scene.info().name, views: views.len(), files })
 }
 

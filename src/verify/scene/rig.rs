@@ -2,6 +2,7 @@
 
 use super::{Scene, SceneOptions};
 use crate::camera::{Camera, Lens, LensKind};
+use crate::photo::Split;
 use glam::{DAffine3, DMat3, DVec2, DVec3, dvec2, dvec3};
 use std::f64::consts::TAU;
 
@@ -11,32 +12,15 @@ pub(super) const ORBIT_FOV_RAD: f64 = 40.0 * TAU / 360.0;
 /// Distance of the cameras of the bounded scenes from the origin.
 const ORBIT_RADIUS: f64 = 4.0;
 
-/// The dataset's splits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Split {
-    Train,
-    Val,
-    Test,
-}
+/// The splits of a generated dataset.
+pub(super) const SPLITS: [Split; 3] = [Split::Train, Split::Val, Split::Test];
 
-impl Split {
-    pub(super) const ALL: [Self; 3] = [Self::Train, Self::Val, Self::Test];
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Train => "train",
-            Self::Val => "val",
-            Self::Test => "test",
-        }
-    }
-
-    /// How many views `options` want of it.
-    pub(super) fn views(self, options: &SceneOptions) -> usize {
-        match self {
-            Self::Train => options.views.train,
-            Self::Val => options.views.val,
-            Self::Test => options.views.test,
-        }
+/// How many views `options` want of a split.
+pub(super) fn view_count(options: &SceneOptions, split: Split) -> usize {
+    match split {
+        Split::Train => options.views.train,
+        Split::Val => options.views.val,
+        Split::Test => options.views.test,
     }
 }
 
@@ -48,7 +32,7 @@ pub(super) fn camera(scene: &Scene, options: &SceneOptions, split: Split, index:
     let size = dvec2(f64::from(width), f64::from(height));
     let is_capture = scene.is_opaque();
     let world_from_camera = match is_capture {
-        true => handheld(&mut random, index, split.views(options)),
+        true => handheld(&mut random, index, view_count(options, split)),
         false => orbit(&mut random, index, orbit_radius(kind)),
     };
     // A capture's sensor is a little off, but a sphere is always whole.
@@ -176,7 +160,7 @@ mod tests {
         let options =
             SceneOptions { views: ViewCounts { train: 40, val: 5, test: 9 }, ..SceneOptions::new(scene) };
         let scene = Scene::named(scene).expect("a known scene");
-        (0..split.views(&options)).map(|i| camera(&scene, &options, split, i)).collect()
+        (0..view_count(&options, split)).map(|i| camera(&scene, &options, split, i)).collect()
     }
 
     #[test]
@@ -205,7 +189,7 @@ mod tests {
     #[test]
     fn splits_and_seeds_differ() {
         for scene in ["toys", "courtyard"] {
-            let [train, val, test] = Split::ALL.map(|split| cameras(scene, split));
+            let [train, val, test] = SPLITS.map(|split| cameras(scene, split));
             for camera in val.iter().chain(&test) {
                 let eye = camera.world_from_camera.translation;
                 let apart = |other: &Camera| other.world_from_camera.translation.distance(eye) > 1e-3;

@@ -1,7 +1,7 @@
 //! The curves as a plot.
 
 use super::curve::Point;
-use super::{Measured, by_config};
+use super::{MeasuredRun, by_config};
 use anyhow::Result;
 use nerf::support::chart::{Axis, Chart, Mark, Series};
 
@@ -10,7 +10,7 @@ const MOST_LINES: usize = 7;
 
 /// PSNR of the test views measured along the way against seconds of training: a line for each run, or for each
 /// config, with the means of its seeds, where those would be too many.
-pub(super) fn plot(runs: &[Measured]) -> Result<String> {
+pub(super) fn plot(runs: &[MeasuredRun]) -> Result<String> {
     let configs = by_config(runs);
     let series = if runs.len() <= MOST_LINES {
         configs.flat_map(lines).collect()
@@ -29,25 +29,25 @@ pub(super) fn plot(runs: &[Measured]) -> Result<String> {
 }
 
 /// The points with as many views as the first measurement.
-fn curve(run: &Measured) -> impl Iterator<Item = &Point> {
+fn curve(run: &MeasuredRun) -> impl Iterator<Item = &Point> {
     let mut measured = run.curve.points.iter().filter_map(|point| point.measured);
     let views = measured.next().map(|measured| measured.views);
     run.curve.points.iter().filter(move |point| views.is_some() && point.measured.map(|m| m.views) == views)
 }
 
-fn coordinates(run: &Measured) -> Vec<(f64, f64)> {
+fn coordinates(run: &MeasuredRun) -> Vec<(f64, f64)> {
     curve(run).filter_map(|point| Some((point.seconds, point.measured?.eval_psnr))).collect()
 }
 
-fn lines(runs: &[Measured]) -> Vec<Series> {
-    let name = |run: &Measured| match runs.len() {
+fn lines(runs: &[MeasuredRun]) -> Vec<Series> {
+    let name = |run: &MeasuredRun| match runs.len() {
         1 => run.config.clone(),
         _ => format!("{}, seed {}", run.config, run.seed),
     };
     runs.iter().map(|run| Series::new(&name(run), Mark::LinePoints, coordinates(run))).collect()
 }
 
-fn mean(runs: &[Measured]) -> Series {
+fn mean(runs: &[MeasuredRun]) -> Series {
     let all: Vec<_> = runs.iter().map(coordinates).collect();
     let shortest = all.iter().map(Vec::len).min().unwrap_or(0);
     let count = all.len() as f64;

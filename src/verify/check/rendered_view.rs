@@ -7,7 +7,7 @@ use crate::camera::Bounds;
 use crate::camera::{Camera, Lens, LensKind};
 use crate::config::Transmittance;
 use crate::field::capacity::{LEAST_WEIGHT, Rounds};
-use crate::field::render::{Renderer, View};
+use crate::field::renderer::{Renderer, View};
 use crate::verify::reference::composite::{mean_depth, opacity, optical_depth, transmittances};
 use crate::verify::reference::lens;
 use crate::verify::reference::march::BoxRay;

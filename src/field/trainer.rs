@@ -5,7 +5,7 @@
 
 use crate::field::layout::pcg;
 use crate::field::state::State;
-use crate::field::views::TrainingViews;
+use crate::field::training_views::TrainingViews;
 use crate::field::visibility::hidden_cells;
 use crate::field::{
     Counters, Field, Plan, Step, StepExcess, Workspace, backward, color, composite, density, dispatch, march,

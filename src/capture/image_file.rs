@@ -3,9 +3,9 @@
 mod alpha;
 mod decode;
 mod depth;
-mod grid;
 mod jpeg;
 mod open_exr;
+mod pixel_grid;
 mod reduce;
 
 use std::path::Path;
@@ -20,9 +20,9 @@ use crate::support::file::write_atomically;
 pub(crate) use alpha::{Evidence, Multiplied};
 use decode::FileFormat;
 pub use depth::{DepthMap, load_depth};
-pub use grid::{Turn, Window};
-pub(crate) use grid::{crop, nearest};
 pub use open_exr::{ExrPixels, Precision, read_exr_channel, write_exr};
+pub use pixel_grid::{Turn, Window};
+pub(crate) use pixel_grid::{crop, nearest};
 pub(crate) use reduce::{reduce_any, reduce_depth};
 
 /// The formats that [`Image::load`] reads, for messages.

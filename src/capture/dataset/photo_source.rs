@@ -4,8 +4,8 @@ use anyhow::{Context, Result, ensure};
 
 use super::sidecars::{Depth, Ignores, Mask, Sidecars};
 use super::{Dataset, Frame, prefetch};
-use crate::capture::image::load_depth;
-use crate::capture::image::{Multiplied, Turn, Window, crop, nearest, reduce_any, reduce_depth};
+use crate::capture::image_file::load_depth;
+use crate::capture::image_file::{Multiplied, Turn, Window, crop, nearest, reduce_any, reduce_depth};
 use crate::photo::{AlphaMode, Photo, Reading};
 use crate::photo::{BitDepth, Image};
 
