@@ -1,6 +1,6 @@
 //! The report as JSON.
 
-use super::page::bits;
+use super::text_report::bits;
 use super::{Preflight, problems};
 use nerf::capture::dataset::Frame;
 use nerf::capture::diagnostics::{Diagnostic, Severity};
