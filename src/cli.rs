@@ -56,7 +56,7 @@ pub(crate) enum Command {
     Render(Render),
     /// Measure a trained field against photos: PSNR and SSIM
     Eval(Eval),
-    /// Write the page about a training: curves, test views, settings
+    /// Write the page about a training run: curves, test views, settings
     Report(Report),
     /// Look at a dataset before training on it: what was read, what was assumed, what is wrong
     Info(info::Info),
@@ -91,7 +91,7 @@ pub(crate) struct Train {
     /// Stop after this many seconds of training, those before --resume included [default: 300 on a CPU]
     ///
     /// Loading, compiling, evaluating and saving do not count. The learning rate falls along a cosine that
-    /// ends where the training does; with --steps too, whichever is nearer to its end counts.
+    /// ends where the run does; with --steps too, whichever is nearer to its end counts.
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) seconds: Option<f64>,
     /// Seed of every random number
@@ -109,10 +109,10 @@ pub(crate) struct Train {
     /// Without a test split, keep every N-th frame for testing, or none
     #[arg(long, value_name = "N|none", default_value = "8", value_parser = hold_out)]
     pub(crate) hold_out: HoldOut,
-    /// Go on with the training in RUN
+    /// Go on with the run in RUN
     #[arg(long, conflicts_with = "overwrite")]
     pub(crate) resume: bool,
-    /// Replace the training in RUN
+    /// Replace the run in RUN
     #[arg(long)]
     pub(crate) overwrite: bool,
     /// Do not measure the test views at the end
@@ -120,8 +120,8 @@ pub(crate) struct Train {
     pub(crate) no_eval: bool,
     /// Measure all test views at the end, however long it takes
     ///
-    /// Otherwise it takes at most a tenth of the training's seconds: where not all test views fit, evenly spaced ones
-    /// are measured, at least one. A --deterministic training always measures all.
+    /// Otherwise it takes at most a tenth of the training time: where not all test views fit, evenly spaced ones
+    /// are measured, at least one. A --deterministic run always measures all.
     #[arg(long, conflicts_with = "no_eval")]
     pub(crate) eval_all: bool,
     /// How photos are read.
@@ -150,7 +150,7 @@ pub(crate) struct Render {
     /// Also write depth as a grey PNG, white near and black far
     #[arg(long)]
     pub(crate) depth: bool,
-    /// Width in pixels; alone, the height follows [default: the file's, else the training's]
+    /// Width in pixels; alone, the height follows [default: the file's, else the run's]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) width: Option<u32>,
     /// Height in pixels; alone, the width follows

@@ -99,7 +99,7 @@ impl Session<'_> {
     }
 }
 
-/// Opens a dataset to compare a field with: the photos are read as the command line says, else as for the training.
+/// Opens a dataset to compare a field with: the photos are read as the command line says, else as for training.
 fn open_to_compare(path: &Path, reading: &PhotoFlags, metadata: &Metadata) -> Result<Dataset> {
     let reading = reading.over(metadata.reading.clone());
     Dataset::open(path, &OpenOptions { reading, ..OpenOptions::default() })

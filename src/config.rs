@@ -1,4 +1,4 @@
-//! Every number that shapes a training, with its default; read from JSON, stored in the checkpoint.
+//! Every number that shapes a training run, with its default; read from JSON, stored in the checkpoint.
 
 mod ranges;
 pub mod schedule;
@@ -204,7 +204,7 @@ pub enum Transmittance {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Accumulation {
-    /// Ordered on CPU adapters; elsewhere fixed where the training is deterministic, else float atomics, else
+    /// Ordered on CPU adapters; elsewhere fixed where the run is deterministic, else float atomics, else
     /// compare-exchange where there are none.
     #[default]
     Auto,

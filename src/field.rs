@@ -62,7 +62,7 @@ pub struct Field {
 enum StepExcess {
     /// This.
     Known(f32),
-    /// What the counters of a training say.
+    /// What the counters of a training run say.
     Counted(Buffer),
 }
 
@@ -123,7 +123,7 @@ impl Field {
         &self.gpu
     }
 
-    /// Back to where a training begins for which nothing can be in the `hidden` cells of the occupancy grid.
+    /// Back to where a training run begins for which nothing can be in the `hidden` cells of the occupancy grid.
     fn reset(&self, hidden: &[bool]) -> Result<()> {
         let start = self.plan.arrays().map(|array| (array.name, array.start(&self.plan, hidden)));
         self.set_arrays(&start.collect::<Vec<_>>())

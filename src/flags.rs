@@ -44,12 +44,12 @@ fn words(remedy: &Remedy) -> String {
         Remedy::SameReading { setting, then, now } => {
             let flag = format!("--{}", setting.replace('_', "-"));
             format!(
-                "the training began with {flag} {then}, and now it is {now}; leave {flag} out on --resume, or start \
+                "the run began with {flag} {then}, and now it is {now}; leave {flag} out on --resume, or start \
                  anew with --overwrite"
             )
         }
         Remedy::UsedFolder => {
-            "name another one, or add --resume to go on with the training in it, or --overwrite to replace it"
+            "name another one, or add --resume to go on with the run in it, or --overwrite to replace it"
                 .to_owned()
         }
         Remedy::RunFolder => "the folder that `nerf train --out` wrote".to_owned(),

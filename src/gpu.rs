@@ -27,7 +27,7 @@ pub struct Gpu {
     error: Arc<Mutex<Option<String>>>,
 }
 
-/// Features that speed the training up and are used wherever the adapter has them.
+/// Features that speed training up and are used wherever the adapter has them.
 pub const WANTED_FEATURES: wgpu::Features = wgpu::Features::SHADER_FLOAT32_ATOMIC
     .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
     .union(wgpu::Features::CLEAR_TEXTURE)

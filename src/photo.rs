@@ -42,7 +42,7 @@ impl From<Image> for Photo {
     }
 }
 
-/// What keeps a training from beginning where masks ignore all of its photos.
+/// What keeps training from beginning where masks ignore all of its photos.
 pub(crate) fn nothing_counts(photos: usize) -> Advised {
     let photos = count(photos, "training photo");
     let found = format!("the masks ignore every pixel of all {photos}; they may be inverted: ");

@@ -139,7 +139,7 @@ struct Throughput {
     samples_per_second_of_two_cores: Option<f64>,
 }
 
-/// A training ready for its first step.
+/// A training run ready for its first step.
 struct Run {
     gpu: Arc<Gpu>,
     trainer: Trainer,
@@ -284,7 +284,7 @@ impl Run {
         sum.seconds = clock.elapsed().as_secs_f64();
         sum.cpu_seconds = cpu.zip(cpu_seconds()).map(|(before, after)| after - before);
         if !sum.loss.is_finite() {
-            bail!("the loss is not finite any more: the training diverged");
+            bail!("the loss is not finite any more: training diverged");
         }
         let samples = sum.samples as f64;
         sum.samples_per_second = samples / sum.seconds.max(1e-9);

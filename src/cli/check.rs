@@ -8,7 +8,7 @@ use nerf::gpu::tensor::TensorMemory;
 use std::path::PathBuf;
 
 /// Help of the choice that is left to the plan.
-const AUTO: &str = "What a training takes on this adapter";
+const AUTO: &str = "What training takes on this adapter";
 
 /// `nerf check`
 #[derive(Args, Debug)]

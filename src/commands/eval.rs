@@ -57,7 +57,7 @@ fn measure(
     Ok(scores)
 }
 
-/// The frames of a split as the training had it, else as the dataset has it.
+/// The frames of a split as the run had it, else as the dataset has it.
 fn frames(
     field: &TrainedField,
     dataset: &Dataset,
@@ -74,7 +74,7 @@ fn frames(
             split.name()
         );
         session.console.warn(&format!(
-            "none of the {} {} views of the training is in this dataset; its own {} are measured",
+            "none of the {} {} views of the run is in this dataset; its own {} are measured",
             names.len(),
             split.name(),
             indices.len()
@@ -83,7 +83,7 @@ fn frames(
     }
     if !missing.is_empty() {
         session.console.warn(&format!(
-            "{} of {} {} views of the training are missing in this dataset: {}",
+            "{} of {} {} views of the run are missing in this dataset: {}",
             missing.len(),
             names.len(),
             split.name(),

@@ -1,4 +1,4 @@
-//! `nerf info`: what a training would make of a dataset, before it takes a night.
+//! `nerf info`: what training would make of a dataset, before it takes a night.
 
 mod json_report;
 mod problems;
@@ -60,7 +60,7 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
         written.map_err(|error| Failed(format!("{error:#}")))?;
     }
     match report.problems.first().filter(|problem| problem.severity == Severity::Error) {
-        Some(problem) => Err(Failed(format!("a training would fail: {}", problem.message)).into()),
+        Some(problem) => Err(Failed(format!("training would fail: {}", problem.message)).into()),
         None => Ok(()),
     }
 }

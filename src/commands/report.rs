@@ -1,4 +1,4 @@
-//! `nerf report`: the page about a training, written by `nerf train` too.
+//! `nerf report`: the page about a training run, written by `nerf train` too.
 
 use super::{Session, open_to_compare};
 use crate::cli::Report as Args;
@@ -24,7 +24,7 @@ pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
         (Facts { trained, ..Facts::of(folder.path(), field.metadata())? }, views)
     } else {
         let reason = format!(
-            "There is no {} yet: the training ended before it saved, so there is nothing to render.",
+            "There is no {} yet: the run ended before it saved, so there is nothing to render.",
             RunFolder::CHECKPOINT
         );
         let run = folder.path().display().to_string();
@@ -59,7 +59,7 @@ pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
 fn views(args: &Args, field: &TrainedField, session: &Session<'_>) -> Result<Result<TestViews, String>> {
     let names = &field.metadata().splits.test;
     if names.is_empty() {
-        return Ok(Err("The training held out no test views.".to_owned()));
+        return Ok(Err("The run held out no test views.".to_owned()));
     }
     let path = args.dataset.clone().unwrap_or_else(|| PathBuf::from(&field.metadata().dataset));
     let (dataset, indices, missing) = match open(&path, args, field) {
@@ -82,16 +82,16 @@ fn views(args: &Args, field: &TrainedField, session: &Session<'_>) -> Result<Res
     Ok(Ok(views))
 }
 
-/// The dataset, its test views as the training had them, and the names of those that it lacks.
+/// The dataset, its test views as the run had them, and the names of those that it lacks.
 fn open(path: &Path, args: &Args, field: &TrainedField) -> Result<(Dataset, Vec<usize>, Vec<String>)> {
     let dataset = open_to_compare(path, &args.reading, field.metadata())?;
     let show = path.display();
     ensure!(
         dataset.is_hdr == field.metadata().features.hdr,
-        "{show} has images of another kind (display-referred or linear) than the training"
+        "{show} has images of another kind (display-referred or linear) than the run"
     );
     let (indices, missing) = dataset.find(&field.metadata().splits.test);
     let missing = missing.into_iter().map(str::to_owned).collect();
-    ensure!(!indices.is_empty(), "none of the training's test views is in {show}");
+    ensure!(!indices.is_empty(), "none of the run's test views is in {show}");
     Ok((dataset, indices, missing))
 }

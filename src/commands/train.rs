@@ -67,7 +67,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     }
     match report {
         Ok(page) => result["report"] = json!(page.display().to_string()),
-        Err(error) => session.console.warn(&format!("the training is saved, but {}", told(&error))),
+        Err(error) => session.console.warn(&format!("the run is saved, but {}", told(&error))),
     }
     session.print(&result, &text)
 }
@@ -121,7 +121,7 @@ fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// How the training went, in one line; `metadata` describes its beginning.
+/// How the run went, in one line; `metadata` describes its beginning.
 fn summary(end: &TrainingEnd, metadata: &Metadata, folder: &str) -> String {
     let steps = count(end.step as usize, "step");
     let mut text = format!("{steps} in {}, saved to {folder}", duration(end.seconds));
@@ -153,9 +153,9 @@ fn summary(end: &TrainingEnd, metadata: &Metadata, folder: &str) -> String {
 fn without_views(reason: NoTestViews, args: &Train) -> String {
     let later = format!("`nerf report {}` renders them.", args.out.display());
     match reason {
-        NoTestViews::NoneHeldOut => "The training held out no test views.".to_owned(),
+        NoTestViews::NoneHeldOut => "The run held out no test views.".to_owned(),
         NoTestViews::Interrupted => {
-            format!("The test views were not rendered, the training was interrupted; {later}")
+            format!("The test views were not rendered, the run was interrupted; {later}")
         }
         NoTestViews::NotAsked => {
             format!("The test views were not rendered, as asked for by --no-eval; {later}")

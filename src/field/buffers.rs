@@ -11,7 +11,7 @@ use crate::gpu::tensor::Element;
 use anyhow::{Result, anyhow};
 
 impl Plan {
-    /// Whether the adapter can run a training of this plan and render its views.
+    /// Whether the adapter can train the field of this plan and render its views.
     ///
     /// # Errors
     /// When it cannot: says what it lacks, and what to change.
@@ -27,13 +27,13 @@ impl Plan {
         Ok(())
     }
 
-    /// Everything but the photos that a training needs, which visits `visible` cells of its occupancy grid.
+    /// Everything but the photos that a training run needs, which visits `visible` cells of its occupancy grid.
     #[must_use]
     pub fn training_buffers(&self, visible: usize) -> Vec<BufferSpec> {
         [self.field_buffers(true), self.step_buffers(visible)].concat()
     }
 
-    /// What the steps of a training need besides the field and the photos.
+    /// What the steps of a training run need besides the field and the photos.
     fn step_buffers(&self, visible: usize) -> Vec<BufferSpec> {
         [
             rays::buffers(self),
@@ -89,7 +89,7 @@ fn setting_of(name: &str) -> &'static str {
 }
 
 impl Workspace {
-    /// Room for the steps of a training of `field`, which visits the cells `visible` of its occupancy grid; the photos are
+    /// Room for training steps of `field`, which visit the cells `visible` of its occupancy grid; the photos are
     /// added later.
     ///
     /// # Errors

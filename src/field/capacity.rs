@@ -15,7 +15,7 @@ pub struct Capacity {
 }
 
 impl Capacity {
-    /// That of a training's steps. Half as many kept samples again as are aimed at, since the number of rays follows it
+    /// That of training steps. Half as many kept samples again as are aimed at, since the number of rays follows it
     /// only from step to step.
     #[must_use]
     pub fn of_steps(batch: &Batch) -> Self {

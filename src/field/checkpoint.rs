@@ -27,7 +27,7 @@ use std::sync::Arc;
 pub const FORMAT: u64 = 2;
 /// The key of the metadata entry.
 pub const KEY: &str = "nerf";
-/// The file's name in the folder of a training.
+/// The file's name in the folder of a training run.
 pub const FILE: &str = "checkpoint.safetensors";
 
 /// A trained field and where its training stands.
@@ -56,9 +56,9 @@ pub struct Metadata {
     /// By how much the steps along its rays are longer than the configuration's, as a share of them.
     #[serde(default)]
     pub step_excess: f32,
-    /// Seconds of training; 0 of a deterministic one.
+    /// Seconds of training; 0 of a deterministic run.
     pub seconds: f64,
-    /// When the training is to end.
+    /// When the run is to end.
     pub budget: Budget,
     /// The resolved configuration; `grid.finest` is never 0.
     pub config: Arc<Config>,
@@ -103,7 +103,7 @@ impl SplitNames {
     }
 }
 
-/// Settings that earlier trainings had, which rendering does not need and training no longer knows.
+/// Settings of earlier versions, which rendering does not need and training no longer knows.
 const RETIRED: [(&str, &str); 3] =
     [("selection", "keep_probability"), ("occupancy", "warm_up"), ("occupancy", "stride")];
 
@@ -213,7 +213,7 @@ impl Checkpoint {
     }
 }
 
-/// The checkpoint that a folder of a training, or a path to the file itself, stands for.
+/// The checkpoint that a folder of a training run, or a path to the file itself, stands for.
 ///
 /// # Errors
 /// When there is none; the message says where it was looked for.
@@ -250,7 +250,7 @@ fn check_finite(name: &str, values: &[f32]) -> Result<()> {
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
         Some(index) => bail!(
-            "the tensor '{name}' has a value that is not finite ({} at {index}): the training diverged; \
+            "the tensor '{name}' has a value that is not finite ({} at {index}): training diverged; \
              start again with a smaller optimizer.learning_rate",
             values[index]
         ),
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_of_earlier_trainings_are_left_out() {
+    fn settings_of_earlier_versions_are_left_out() {
         let metadata = checkpoint().metadata;
         let mut value = serde_json::to_value(&metadata).expect("JSON");
         for (group, key) in RETIRED {

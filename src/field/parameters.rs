@@ -1,4 +1,4 @@
-//! The parameter groups of a field: one table, from which buffers, the state of a training, checkpoints, memory and Adam
+//! The parameter groups of a field: one table, from which buffers, the state of a training run, checkpoints, memory and Adam
 //! follow. One group more is one row here, and its kernels.
 
 use super::Plan;
@@ -162,7 +162,7 @@ impl Numbers {
     }
 }
 
-/// An array that the state of a training has: the parameters of a group, or what Adam keeps of them.
+/// An array that the state of a training run has: the parameters of a group, or what Adam keeps of them.
 #[derive(Clone)]
 pub struct Array {
     /// What kernels and checkpoints call it.
@@ -188,7 +188,7 @@ impl Array {
         self.place == ArrayStorage::Tensor(Element::U32)
     }
 
-    /// What it holds before the first step of a training where nothing can be in the `hidden` cells.
+    /// What it holds before the first step of a training run where nothing can be in the `hidden` cells.
     #[must_use]
     pub fn start(&self, plan: &Plan, hidden: &[bool]) -> Numbers {
         match self.start {
@@ -212,7 +212,7 @@ impl Array {
 }
 
 impl Plan {
-    /// The arrays of the state of a training, group by group. A group without numbers has none.
+    /// The arrays of the state of a training run, group by group. A group without numbers has none.
     pub fn arrays(&self) -> impl Iterator<Item = Array> {
         GROUPS.iter().flat_map(|group| {
             let shape = (group.shape)(self);

@@ -79,7 +79,7 @@ impl Plan {
         Self { config, layout, features, space, capacity, product, accumulation, memory, chunks, rounds }
     }
 
-    /// The plan of a renderer of the same field for cameras with `lenses`, whose room does not depend on the training's.
+    /// The plan of a renderer of the same field for cameras with `lenses`, whose room does not depend on the run's.
     #[must_use]
     pub fn for_views(&self, lenses: &BTreeSet<LensKind>) -> Self {
         let features = SceneFeatures { lenses: lenses.clone(), ..self.features.clone() };

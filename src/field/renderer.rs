@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// Most rounds of one submission: drivers give up on those that take seconds.
 const MOST_ROUNDS: usize = 8;
 
-/// How much of what a training's steps are too long by is left in a view: rays that are not jittered need finer ones.
+/// How much of what training steps are too long by is left in a view: rays that are not jittered need finer ones.
 /// Without any a view takes twice as long for 0.2 dB more (can_270x480), with all of it it has 0.5 dB less.
 const STEP_EXCESS: f32 = 0.5;
 

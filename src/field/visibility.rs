@@ -1,6 +1,6 @@
 //! Cells of the occupancy grid that can never hold anything: seen by no camera, or carved by silhouettes.
 //!
-//! Leaving them out from the start saves the first steps of a training, which would otherwise fill the box
+//! Leaving them out from the start saves the first steps of a training run, which would otherwise fill the box
 //! with fog and dissolve it again.
 
 use super::Space;

@@ -63,7 +63,7 @@ impl Workspace {
     /// The part that reads the pages.
     ///
     /// # Errors
-    /// When there are none: only a training has photos.
+    /// When there are none: only a training run has photos.
     pub fn pages_part(&self) -> Result<String> {
         Ok(self.pages.as_ref().context("this workspace has no photos")?.part())
     }

@@ -1,4 +1,4 @@
-//! How much memory a training on a dataset would take, before anything is loaded.
+//! How much memory training on a dataset would take, before anything is loaded.
 
 use super::memory::MemoryUse;
 use super::training_photos::TrainingPhotos;
@@ -9,7 +9,7 @@ use crate::gpu::Gpu;
 use crate::gpu::paged_array::PageCapacity;
 use anyhow::Result;
 
-/// What a training with the settings for its adapter takes.
+/// What a training run with the settings for its adapter takes.
 #[derive(Debug)]
 pub struct Estimate {
     /// Bytes.
@@ -29,7 +29,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// For a training on the training frames of `dataset` on `gpu`, or on a usual GPU where there is none.
+    /// For a training run on the training frames of `dataset` on `gpu`, or on a usual GPU where there is none.
     ///
     /// # Errors
     /// When the settings ask for what the photos do not have.

@@ -35,7 +35,7 @@ pub enum Event<'a> {
         /// Number of test views.
         test_views: usize,
     },
-    /// What the training takes of the memory, before it is taken.
+    /// What the run takes of the memory, before it is taken.
     Memory(MemoryUse),
     /// So many training photos are on the device.
     Loading {

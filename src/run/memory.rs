@@ -1,4 +1,4 @@
-//! What a training takes of the host's memory and of the device's, told before a photo is loaded.
+//! What training takes of the host's memory and of the device's, told before a photo is loaded.
 
 use crate::camera::Camera;
 use crate::field::Plan;
@@ -15,7 +15,7 @@ use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 /// Bytes of the program itself, its driver and the kernels that it compiles.
 const BASE_BYTES: u64 = 640 << 20;
 
-/// Bytes at the peak of a training.
+/// Bytes at the peak of a training run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct MemoryUse {
     /// On the host, without what the device holds.
@@ -27,7 +27,7 @@ pub struct MemoryUse {
 }
 
 impl MemoryUse {
-    /// What a training of `plan` takes whose photos `cameras` took; loading them takes `stream_bytes`.
+    /// What training `plan` takes with the photos that `cameras` took; loading them takes `stream_bytes`.
     #[must_use]
     pub fn of_training(plan: &Plan, cameras: &[Camera], stream_bytes: u64) -> Self {
         let pixels = cameras.iter().map(|camera| camera.width as usize * camera.height as usize);
@@ -63,7 +63,7 @@ impl MemoryUse {
         if let Some(available) = available_bytes().filter(|&available| available < on_host) {
             let others = on_host - self.photo_bytes;
             let found = format!(
-                "the training takes {} of memory, and this machine has {} left; ",
+                "training takes {} of memory, and this machine has {} left; ",
                 bytes(on_host),
                 bytes(available),
             );

@@ -1,4 +1,4 @@
-//! The page about a training: one HTML file that needs neither network nor script.
+//! The page about a training run: one HTML file that needs neither network nor script.
 //!
 //! Data in, text out: the rows of a run's log ([`log`](super::log)), the scores of the test views and small pictures of some of
 //! them ([`views`], [`pictures`]) become curves, tables and images in one page.
@@ -21,10 +21,10 @@ use std::path::Path;
 use std::time::SystemTime;
 use test_views::{Outcome, TestViews};
 
-/// What is known about a training; everything may be missing.
+/// What is known about a training run; everything may be missing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
-    /// The folder of the training.
+    /// The folder of the run.
     pub run: String,
     /// The dataset as it was named.
     pub dataset: Option<String>,
@@ -36,7 +36,7 @@ pub struct Facts {
     pub steps: Option<u64>,
     /// Seconds of training.
     pub seconds: Option<f64>,
-    /// Whether the training has reached the end it was given.
+    /// Whether the run has reached the end it was given.
     pub is_done: Option<bool>,
     /// Number of views trained on.
     pub train_views: Option<usize>,
@@ -67,7 +67,7 @@ impl Facts {
     }
 }
 
-/// A training to write about.
+/// A training run to write about.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// What is known about it.

@@ -78,7 +78,7 @@ impl Resolved {
         TrainingPhotos { dataset, frames: &self.train }
     }
 
-    /// Whether there is room for the training and its photos, on the host and on the device; tells what they take.
+    /// Whether there is room for training and its photos, on the host and on the device; tells what they take.
     ///
     /// # Errors
     /// When there is not; the message says how much there is, and what to do.
@@ -134,7 +134,7 @@ fn ended(metadata: Metadata, options: &TrainOptions, gpu: &Gpu, earlier: Option<
     budget.validate()?;
     if metadata.config.deterministic && budget.seconds.is_some() {
         let why = ": how many steps fit into a time differs from run to run";
-        bail!(Advised::new("a deterministic training needs ", Remedy::StepsAlone, why));
+        bail!(Advised::new("a deterministic run needs ", Remedy::StepsAlone, why));
     }
     Ok(Metadata { dataset: options.dataset.clone(), adapter: gpu.info.name.clone(), budget, ..metadata })
 }
@@ -175,7 +175,7 @@ fn again(options: &TrainOptions, metadata: Metadata, dataset: &Dataset, train: &
     let is_same = Layout::new(&config) == Layout::new(&metadata.config)
         && config.occupancy.cells == metadata.config.occupancy.cells;
     if !is_same {
-        let found = "a training cannot change its grid, network or occupancy grid ";
+        let found = "a training run cannot change its grid, network or occupancy grid ";
         bail!(Advised::new(found, Remedy::SameField, ""));
     }
     let features = metadata.features.clone().for_photos(dataset, train, &config)?;
@@ -222,7 +222,7 @@ fn same_frames(metadata: &Metadata, dataset: &Dataset) -> Result<(Vec<usize>, Ve
     );
     ensure!(
         metadata.features.hdr == dataset.is_hdr,
-        "the training began with images of another kind (display-referred or linear); resume with {}",
+        "the run began with images of another kind (display-referred or linear); resume with {}",
         metadata.dataset
     );
     Ok((train, dataset.find(&metadata.splits.test).0))

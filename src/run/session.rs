@@ -146,7 +146,7 @@ impl TrainingSession<'_> {
     /// Trains until the budget is spent or `stop` is raised, and saves.
     ///
     /// # Errors
-    /// When the training leads nowhere any more, the device was lost, or a file cannot be written. The newest
+    /// When the run leads nowhere any more, the device was lost, or a file cannot be written. The newest
     /// checkpoint stays; the message tells its step.
     pub fn train(&mut self, stop: &AtomicBool, observer: &mut dyn Observer) -> Result<TrainingEnd> {
         while !self.stepper.is_over() && !stop.load(Ordering::Relaxed) {

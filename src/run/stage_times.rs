@@ -1,4 +1,4 @@
-//! Where the time of a training goes, from the device's timestamps.
+//! Where the time of a training run goes, from the device's timestamps.
 
 use super::log::StageTime;
 use crate::gpu::Gpu;

@@ -89,7 +89,7 @@ impl Stepper {
     /// Takes at least one and at most 16 steps, neither beyond the budget nor beyond `pause`, and waits.
     ///
     /// # Errors
-    /// When the training leads nowhere any more, or the device was lost.
+    /// When the run leads nowhere any more, or the device was lost.
     pub fn block(&mut self, pause: Budget) -> Result<Block> {
         let first = self.steps();
         let count = self.clock.steps_until(pause, first, BLOCK);
@@ -121,7 +121,7 @@ impl Stepper {
             _ => return Ok(()),
         };
         bail!(
-            "{found} at step {}: the training diverged; start again with a smaller optimizer.learning_rate ({} was \
+            "{found} at step {}: training diverged; start again with a smaller optimizer.learning_rate ({} was \
              used)",
             self.trainer.steps(),
             self.clock.first_learning_rate()

@@ -67,7 +67,7 @@ impl<'a> TrainingPhotos<'a> {
 }
 
 impl Plan {
-    /// The plan of a training on the training frames of `dataset`, whose grid is as fine as their pixels unless `config`
+    /// The plan of a training run on the training frames of `dataset`, whose grid is as fine as their pixels unless `config`
     /// says how fine.
     ///
     /// # Errors
@@ -85,7 +85,7 @@ impl Trainer {
     ///
     /// # Errors
     /// When there is no frame to train on, a setting is out of range, a photo cannot be read, or the adapter cannot hold
-    /// the training.
+    /// the run.
     pub fn on(gpu: &Arc<Gpu>, dataset: &Dataset, config: Config) -> Result<Self> {
         config.validate()?;
         let plan = Plan::for_dataset(gpu, dataset, config)?;

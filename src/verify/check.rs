@@ -53,7 +53,7 @@ const CHECKS: [KernelCheck; 17] = [
     KernelCheck { name: "lenses", run: lens::lens_models },
     KernelCheck { name: "rays of views", run: rays::view_rays },
     KernelCheck { name: "rays of large views", run: rays::sharp_rays },
-    KernelCheck { name: "rays of a training", run: |adapter| Ok(vec![rays::training_rays(adapter)?]) },
+    KernelCheck { name: "training rays", run: |adapter| Ok(vec![rays::training_rays(adapter)?]) },
     KernelCheck { name: "marching", run: marching::marched_samples },
     KernelCheck { name: "hash grid", run: |adapter| Ok(vec![grid::features(adapter)?]) },
     KernelCheck { name: "selection", run: |adapter| Ok(vec![selection::selected_samples(adapter)?]) },

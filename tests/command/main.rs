@@ -1,4 +1,4 @@
-//! The program as its users start it: every command, what it says and writes, and the page about a training.
+//! The program as its users start it: every command, what it says and writes, and the page about a training run.
 //!
 //! Trainings need an adapter; a software driver (lavapipe) is enough.
 

@@ -1,4 +1,4 @@
-//! The page about a training: how logs are read, what the page shows, and that it needs nothing but itself.
+//! The page about a training run: how logs are read, what the page shows, and that it needs nothing but itself.
 
 mod browser;
 mod command;

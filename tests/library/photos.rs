@@ -1,4 +1,4 @@
-//! Photos as a training gets them: masks, alpha, depth, orientation, crops and sizes.
+//! Photos as training gets them: masks, alpha, depth, orientation, crops and sizes.
 
 mod alpha;
 mod depth;

@@ -13,7 +13,7 @@ use nerf::verify::check::{Setup, Workbench};
 use nerf::verify::reference::model::{RaySample, TrainingRay};
 use std::sync::Arc;
 
-/// The transmittance of the early stop, that of a training.
+/// The transmittance of the early stop, that of a training run.
 pub(crate) const STOP: f64 = 1e-4;
 /// Samples on the device at once: about 700 bytes each, and on a GPU enough to fill it.
 const SAMPLES_ON_CPU: usize = 1 << 18;
@@ -167,7 +167,7 @@ impl Device {
     }
 }
 
-/// Selection, as a training has it, and compositing, with the variant's constants.
+/// Selection, as a training run has it, and compositing, with the variant's constants.
 fn stages(bench: &Workbench, variant: Variant) -> Result<Vec<Stage>> {
     let mut config = Config::clone(&bench.plan.config);
     config.selection.stop_transmittance = variant.stop();

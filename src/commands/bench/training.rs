@@ -24,18 +24,18 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What the seconds of a training are.
+/// What the seconds of training are.
 const CLOCK: &str = "training alone, without loading, compiling and measuring; the steps of one block in sixteen wait \
                      for the device each, so that their stages can be timed";
 
-/// One training to be measured.
+/// One run to be measured.
 struct PlannedRun {
     /// The stem of its config's file.
     config: String,
     resolved: Resolved,
 }
 
-/// One training that was measured.
+/// One run that was measured.
 #[derive(Serialize)]
 struct MeasuredRun {
     config: String,

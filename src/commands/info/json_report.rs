@@ -8,7 +8,7 @@ use nerf::capture::health::{Arrangement, Spread};
 use serde_json::{Value, json};
 
 impl Preflight<'_> {
-    /// Whether a training can begin.
+    /// Whether training can begin.
     pub(super) fn is_ok(&self) -> bool {
         self.problems.iter().all(|problem| problem.severity != Severity::Error)
     }

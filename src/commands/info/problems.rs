@@ -10,7 +10,7 @@ pub(super) fn found(dataset: &Dataset) -> usize {
     dataset.listed - dataset.missing.len()
 }
 
-/// What keeps a training from beginning, and what the reader remarked.
+/// What keeps training from beginning, and what the reader remarked.
 pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Diagnostic> {
     let mut problems = Vec::new();
     problems.extend(dataset.damaged.iter().map(Diagnostic::error));

@@ -183,10 +183,10 @@ impl Preflight<'_> {
         let (errors, warnings) = (number(Severity::Error), number(Severity::Warning));
         match (errors, warnings) {
             (0, 0) => "ready to train; nothing looks wrong".to_owned(),
-            (0, warnings) => format!("a training can begin; {}", count(warnings, "warning")),
-            (errors, 0) => format!("a training would fail; {}", count(errors, "error")),
+            (0, warnings) => format!("training can begin; {}", count(warnings, "warning")),
+            (errors, 0) => format!("training would fail; {}", count(errors, "error")),
             (errors, warnings) => {
-                format!("a training would fail; {}, {}", count(errors, "error"), count(warnings, "warning"))
+                format!("training would fail; {}, {}", count(errors, "error"), count(warnings, "warning"))
             }
         }
     }

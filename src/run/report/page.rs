@@ -96,7 +96,7 @@ fn warnings(report: &Report) -> Markup {
         @if let Some(fog) = fog { p.warning { strong { "Fog: " } (fog) "." } }
         @if report.facts.is_done == Some(false) {
             p.warning {
-                strong { "The training was interrupted before its end. " }
+                strong { "The run was interrupted before its end. " }
                 "Resumed in its folder, it goes on from the last checkpoint."
             }
         }
@@ -183,7 +183,7 @@ fn gallery(views: &TestViews, hdr: bool) -> Markup {
             @if hdr { " Linear light is clamped to 0…1 and sRGB-encoded, for the pictures and for the scores." }
             @if views.left_out > 0 {
                 " " (views.left_out) (plural(views.left_out as u64, " more was", " more were"))
-                " left out, because measuring takes at most a tenth of the training's time; "
+                " left out, because measuring takes at most a tenth of the training time; "
                 code { "nerf eval RUN DATASET" } " measures all, and " code { "nerf report RUN" } " shows them."
             }
             @if !views.missing.is_empty() {

@@ -11,7 +11,7 @@ use anyhow::Result;
 use std::path::PathBuf;
 use std::time::{Instant, SystemTime};
 
-/// Measuring the test views at the end takes at most this part of the training's seconds, unless all are asked for.
+/// Measuring the test views at the end takes at most this part of the training time, unless all are asked for.
 const EVALUATION_SHARE: f64 = 0.1;
 
 /// Why test views were not measured at the end.

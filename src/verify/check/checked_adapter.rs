@@ -91,9 +91,9 @@ impl CheckedAdapter {
         ];
         let kind = if self.gpu.is_cpu() { "a CPU adapter" } else { "a GPU" };
         let why = match parts.iter().filter(|(_, is_forced)| *is_forced).count() {
-            0 => format!(": what a training takes on {kind}"),
+            0 => format!(": what training takes on {kind}"),
             3 => String::new(),
-            _ => format!("; the rest is what a training takes on {kind}"),
+            _ => format!("; the rest is what training takes on {kind}"),
         };
         let named = parts.map(|(name, is_forced)| name + if is_forced { " (asked for)" } else { "" });
         Ok(named.join(", ") + &why)

@@ -1,4 +1,4 @@
-//! Rays through pixels: those of a view through every lens, and those of a training with their targets.
+//! Rays through pixels: those of a view through every lens, and those of a training run with their targets.
 
 mod training_rays;
 mod view_rays;

@@ -1,4 +1,4 @@
-//! The rays that a training draws: from which pixel of which photo, and what they should look like.
+//! The rays that a training run draws: from which pixel of which photo, and what they should look like.
 
 use super::{DeviceRay, bounds, camera, is_close_to_a_fold};
 use crate::camera::{Camera, Lens};
@@ -43,13 +43,13 @@ struct Photos {
     counting: Vec<Vec<u32>>,
 }
 
-/// Rays, targets and backgrounds that a training draws, from photos of all kinds, with masks and depth.
+/// Rays, targets and backgrounds that a training run draws, from photos of all kinds, with masks and depth.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
 pub fn training_rays(adapter: &CheckedAdapter) -> Result<CheckResult> {
     let mut result =
-        CheckResult::new("rays of a training", 4e-7, "a rotation, a unit vector, a product of colours round");
+        CheckResult::new("training rays", 4e-7, "a rotation, a unit vector, a product of colours round");
     let kind = |alpha, hdr, deep, masks, depth| SceneFeatures {
         alpha,
         hdr,
