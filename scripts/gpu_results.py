@@ -228,7 +228,7 @@ def report(result):
         "What the adapter can do": guarded(ceilings_section, result),
         f"A step of the GPU defaults, generated photos of {side(result)}x{side(result)} pixels": guarded(step_section, result),
         "Other settings": guarded(sweeps_section, result),
-        "Trainings, all test views": guarded(trainings_section, result),
+        "Training runs, all test views": guarded(trainings_section, result),
         "Rendering": f"A view of {side(result)}x{side(result)} pixels, median: {guarded(view_ms, result)} ms.",
         "What ran": table(["part", "status", "why", "seconds"], parts, left=3),
     }

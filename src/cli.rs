@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// Train neural radiance fields from posed photos and render new views of them.
 ///
 /// Runs on any GPU with Vulkan, Metal or DX12, and on a CPU through a software driver.
-/// Results go to stdout, progress and remarks to stderr. Exit codes: 0 done, 1 failed, 2 usage.
+/// Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 failed, 2 usage.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true, propagate_version = true)]
 pub(crate) struct Cli {
@@ -39,10 +39,10 @@ pub(crate) struct Global {
     /// Print one JSON object as the result, also when failing
     #[arg(long, global = true)]
     pub(crate) json: bool,
-    /// No progress and no remarks
+    /// No progress and no messages
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
-    /// More remarks
+    /// More messages
     #[arg(long, short, global = true, action = ArgAction::Count, conflicts_with = "quiet")]
     pub(crate) verbose: u8,
 }
@@ -109,7 +109,7 @@ pub(crate) struct Train {
     /// Without a test split, keep every N-th frame for testing, or none
     #[arg(long, value_name = "N|none", default_value = "8", value_parser = hold_out)]
     pub(crate) hold_out: HoldOut,
-    /// Go on with the run in RUN
+    /// Continue the run in RUN
     #[arg(long, conflicts_with = "overwrite")]
     pub(crate) resume: bool,
     /// Replace the run in RUN

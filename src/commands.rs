@@ -83,7 +83,7 @@ impl Session<'_> {
         Ok(field)
     }
 
-    /// Puts what a run tells into words.
+    /// Prints the events of a run.
     fn narrator(&self) -> Narrator {
         Narrator::new(self.console)
     }

@@ -1,7 +1,7 @@
 //! Console on stderr.
 
 use crate::cli::Global;
-use crate::flags::spoken;
+use crate::flags::message_with_flags;
 use nerf::capture::dataset::Dataset;
 use nerf::capture::diagnostics::Severity;
 use nerf::run::depths::fog;
@@ -52,9 +52,11 @@ impl Console {
     pub(crate) fn notes(self, dataset: &Dataset) {
         for note in &dataset.notes {
             match note.severity {
-                Severity::Note => self.say(&format!("note: {}", spoken(&note.message, note.remedy.as_ref()))),
+                Severity::Note => {
+                    self.say(&format!("note: {}", message_with_flags(&note.message, note.remedy.as_ref())))
+                }
                 Severity::Warning | Severity::Error => {
-                    self.warn(&spoken(&note.message, note.remedy.as_ref()))
+                    self.warn(&message_with_flags(&note.message, note.remedy.as_ref()))
                 }
             }
         }

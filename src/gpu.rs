@@ -74,7 +74,7 @@ impl Gpu {
     }
 
     /// A device that is open already, for example that of a viewer: of the wanted features it uses those that it has. Its
-    /// errors are told by [`Gpu::check`] from now on.
+    /// errors are reported by [`Gpu::check`] from now on.
     #[must_use]
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
         let error = Arc::new(Mutex::new(None));

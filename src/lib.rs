@@ -10,7 +10,7 @@
 //! A [`Dataset`] has cameras and photos from files. A [`Field`] is a radiance field on a device ([`Gpu`]): a [`Trainer`]
 //! takes steps (rays, march, density, selection, colour, the fused render·loss·gradient kernel, backward, Adam), a
 //! [`Renderer`] shows it to any camera, and a [`Checkpoint`] keeps it on disk. A [`TrainingRun`] is a whole run,
-//! with its budget, log, checkpoints and evaluation, told to an [`Observer`]; the command line is a thin layer on it.
+//! with its budget, log, checkpoints and evaluation, reported to an [`Observer`]; the command line is a thin layer on it.
 //!
 //! Without the default feature `cli` there is no terminal; without `run` there are no files but checkpoints: no datasets,
 //! no decoders, no charts, no command line.

@@ -18,7 +18,7 @@ fn main() -> ExitCode {
     if is_broken_pipe(&error) {
         return ExitCode::SUCCESS;
     }
-    let message = flags::told(&error);
+    let message = flags::with_flags(&error);
     // Where even this cannot be written, the exit code still tells.
     if cli.global.json && !error.is::<commands::Failed>() {
         let _ = writeln!(std::io::stdout(), "{}", serde_json::json!({ "error": message }));

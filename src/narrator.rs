@@ -1,4 +1,4 @@
-//! What a run tells, in words on stderr.
+//! Reports the events of a run on stderr.
 
 use crate::console::Console;
 use crate::progress::{Progress, duration, short};
@@ -10,7 +10,7 @@ use nerf::run::memory::MemoryUse;
 use nerf::run::{Event, Observer, StepsTaken};
 use nerf::support::format::{bytes, count};
 
-/// Puts events into words, and long ones into progress.
+/// Prints events, and shows progress for long ones.
 #[derive(Debug)]
 pub(crate) struct Narrator {
     console: Console,

@@ -1,10 +1,10 @@
-//! What test views say, in words and as entries of a result.
+//! Scores of test views, as text and as entries of a JSON result.
 
 use nerf::run::report::test_views::Outcome;
 use nerf::support::format::percent;
 use serde_json::{Value, json};
 
-/// In words.
+/// One line of text.
 pub(crate) fn describe(outcome: &Outcome) -> String {
     let Outcome { psnr, ssim, near_share, .. } = *outcome;
     let (measured, near) = (outcome.measured(), describe_near(near_share));

@@ -2,9 +2,9 @@
 //! report.
 //!
 //! [`TrainOptions`] and a dataset become [`Resolved`] settings; a [`TrainingRun`] of them becomes a [`TrainingSession`],
-//! which takes the steps, evaluates test views, logs and saves. What happens is told to an [`Observer`]; nothing here
+//! which takes the steps, evaluates test views, logs and saves. What happens is reported to an [`Observer`]; nothing here
 //! prints. The pieces stand alone, too: [`TrainingPhotos`] puts photos on a device,
-//! [`Trainer::on`](crate::field::train::Trainer::on) is a trainer on a dataset, an [`Evaluator`] compares rendered views
+//! [`Trainer::on`](crate::field::trainer::Trainer::on) is a trainer on a dataset, an [`Evaluator`] compares rendered views
 //! with photos, and a [`TrainedField`] is a checkpoint to be rendered.
 
 mod clock;

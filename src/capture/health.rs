@@ -24,7 +24,7 @@ use crate::capture::focus::{Focus, OpticalAxis, find};
 use gallery::Gallery;
 use glam::DVec3;
 
-/// What the cameras of a dataset tell.
+/// What the cameras of a dataset show.
 #[derive(Clone, Debug)]
 pub struct Survey {
     /// Indices of the frames that were looked at: one per image, where several splits list it.

@@ -6,7 +6,7 @@ mod text_report;
 
 use super::{Failed, Session};
 use crate::cli::info::Info;
-use crate::flags::{spoken, told};
+use crate::flags::{message_with_flags, with_flags};
 use crate::progress::Progress;
 use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
@@ -44,11 +44,11 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
     };
     let dataset = match Dataset::open(&args.dataset, &options) {
         Ok(dataset) => dataset,
-        Err(error) => return unreadable(args, &told(&error), session),
+        Err(error) => return unreadable(args, &with_flags(&error), session),
     };
     let mut report = inspect(args, &dataset, session)?;
     for problem in &mut report.problems {
-        problem.message = spoken(&problem.message, problem.remedy.as_ref());
+        problem.message = message_with_flags(&problem.message, problem.remedy.as_ref());
     }
     report.problems.sort_by_key(|problem| problem.severity);
     session.print(&report.json(), &report.text())?;
@@ -99,7 +99,7 @@ fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, 
         .map(|&index| {
             let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
             progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
-            look.map_err(|error| Diagnostic::error(told(&error)).about(vec![index]))
+            look.map_err(|error| Diagnostic::error(with_flags(&error)).about(vec![index]))
         })
         .collect();
     let (looks, failures): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);

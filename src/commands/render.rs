@@ -66,7 +66,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     session.print(&result, &format!("{} in {out}", count(jobs.len(), "frame")))
 }
 
-/// Renders the jobs in order, describes their files, and tells the seconds that each took to render. A thread writes those
+/// Renders the jobs in order, describes their files, and returns the seconds that each took to render. A thread writes those
 /// of one view while the next one renders.
 fn render_and_write(
     renderer: &mut Renderer,

@@ -2,7 +2,7 @@
 
 use super::{Session, open_to_compare};
 use crate::cli::Report as Args;
-use crate::flags::told;
+use crate::flags::with_flags;
 use crate::outcome;
 use anyhow::{Result, ensure};
 use nerf::camera::LensKind;
@@ -68,7 +68,7 @@ fn views(args: &Args, field: &TrainedField, session: &Session<'_>) -> Result<Res
             return Ok(Err(format!(
                 "The test views are not shown: their dataset could not be used ({}). If it has moved, say \
                  where it is: nerf report {} --dataset DATASET",
-                told(&error),
+                with_flags(&error),
                 args.run.display()
             )));
         }

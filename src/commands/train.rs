@@ -2,7 +2,7 @@
 
 use super::Session;
 use crate::cli::Train;
-use crate::flags::{spoken, told};
+use crate::flags::{message_with_flags, with_flags};
 use crate::outcome;
 use crate::progress::duration;
 use anyhow::{Context, Result};
@@ -67,7 +67,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     }
     match report {
         Ok(page) => result["report"] = json!(page.display().to_string()),
-        Err(error) => session.console.warn(&format!("the run is saved, but {}", told(&error))),
+        Err(error) => session.console.warn(&format!("the run is saved, but {}", with_flags(&error))),
     }
     session.print(&result, &text)
 }
@@ -91,7 +91,7 @@ fn open(args: &Train, checkpoint: Option<&Checkpoint>, session: &Session<'_>) ->
     session.console.notes(&dataset);
     let findings = Survey::of(&dataset).findings;
     for finding in findings.iter().filter(|finding| finding.severity < Severity::Note) {
-        session.console.warn(&spoken(&finding.message, finding.remedy.as_ref()));
+        session.console.warn(&message_with_flags(&finding.message, finding.remedy.as_ref()));
     }
     Ok(dataset)
 }

@@ -1,4 +1,4 @@
-//! What a plan needs on the device, told before anything is allocated.
+//! The buffers that a plan needs on the device, listed before anything is allocated.
 
 use super::layout::Level;
 use super::{

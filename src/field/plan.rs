@@ -92,7 +92,7 @@ impl Plan {
         self.space.step_range(&self.config.march, self.config.occupancy.cells)
     }
 
-    /// The least step in sides of the inner cube: what an optical depth of the occupancy grid is told over.
+    /// The least step in sides of the inner cube: the length that an optical depth of the occupancy grid is taken over.
     #[must_use]
     pub fn least_step(&self) -> f64 {
         self.step_range()[0] * self.space.cubes_per_box()

@@ -87,7 +87,7 @@ impl Record {
         Ok(Cow::Owned(words))
     }
 
-    /// Whether a record holds all that the photo tells. Without positions a pixel's record is found by its number, so
+    /// Whether a record holds all channels of the photo. Without positions a pixel's record is found by its number, so
     /// that one left out would move all behind it; without alpha what is transparent would be trained on as it is stored.
     fn check(&self, photo: &Photo) -> Result<()> {
         let Photo { image, ignored, depth } = photo;
@@ -144,7 +144,7 @@ impl Record {
     }
 }
 
-/// What to do about a photo that the features do not tell of.
+/// What to do about a photo that the plan's features do not cover.
 const TAKE_FEATURES: &str =
     "take the features of the photos themselves (SceneFeatures::of), or start again if a file has changed";
 

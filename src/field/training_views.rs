@@ -1,4 +1,4 @@
-//! The training views on their way to the device: cameras, photos, and what their silhouettes tell.
+//! The training views on their way to the device: cameras, photos, and their silhouettes.
 
 use super::Space;
 use crate::camera::Camera;
@@ -72,7 +72,7 @@ impl TrainingViews {
     /// Adds the photo of the next camera.
     ///
     /// # Errors
-    /// When it is not of the camera's size, has more to tell than the plan's features say, there is no camera left, or
+    /// When it is not of the camera's size, has more channels than the plan's features say, there is no camera left, or
     /// the device was lost.
     pub fn add(&mut self, photo: &Photo) -> Result<()> {
         let number = self.silhouettes.len();

@@ -4,7 +4,7 @@ use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Result, bail};
 use serde::Serialize;
 
-/// What `nerf adapters` tells of one adapter.
+/// What `nerf adapters` prints about one adapter.
 #[derive(Clone, Debug, Serialize)]
 pub struct AdapterEntry {
     /// The index that [`choose`] takes.
@@ -26,7 +26,7 @@ pub struct AdapterEntry {
     pub subgroup_sizes: [u32; 2],
     /// The matrix products that it has units for.
     pub cooperative_matrices: Vec<MatrixSize>,
-    /// All that wgpu tells of its limits.
+    /// All that wgpu says of its limits.
     pub limits: wgpu::Limits,
 }
 

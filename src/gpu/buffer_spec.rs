@@ -1,4 +1,4 @@
-//! Buffers and tensors that are yet to be allocated: what something needs on a device, told before there is one.
+//! Descriptions of buffers and tensors that are yet to be allocated, from which their sizes are known before there is a device.
 
 use super::Gpu;
 use super::buffer::Buffer;
@@ -76,7 +76,7 @@ impl BufferSpec {
     /// Whether the adapter can bind as much.
     ///
     /// # Errors
-    /// When it cannot; the message tells both sizes.
+    /// When it cannot; the message says both sizes.
     pub fn check(&self, gpu: &Gpu) -> Result<()> {
         match self.kind {
             Storage::Tensor(_, TensorMemory::Textures) => gpu.check_texture(self.name, self.count),
@@ -87,7 +87,7 @@ impl BufferSpec {
     /// Allocates it, zeroed.
     ///
     /// # Errors
-    /// When it is larger than the adapter can bind; the message tells both sizes.
+    /// When it is larger than the adapter can bind; the message says both sizes.
     pub fn allocate(&self, gpu: &Gpu) -> Result<Allocation> {
         Ok(match self.kind {
             Storage::Buffer(usage) => Allocation::Buffer(gpu.buffer(self.name, self.bytes(), usage)?),

@@ -142,7 +142,7 @@ impl PagedArray {
     /// A zeroed array of `rows` rows.
     ///
     /// # Errors
-    /// When the adapter cannot bind or does not have as much; the message tells both sizes.
+    /// When the adapter cannot bind or does not have as much; the message says both sizes.
     pub fn new(gpu: &Gpu, name: &'static str, rows: usize, capacity: PageCapacity) -> Result<Self> {
         let count = rows.div_ceil(capacity.page_rows).max(1);
         ensure!(

@@ -176,7 +176,7 @@ impl Gpu {
     /// A zeroed tensor.
     ///
     /// # Errors
-    /// When it is larger than the adapter can bind; the message tells both sizes.
+    /// When it is larger than the adapter can bind; the message says both sizes.
     pub fn tensor(
         &self,
         name: &'static str,

@@ -15,8 +15,8 @@ pub struct StepClock {
 }
 
 impl StepClock {
-    /// The clock of the run that `metadata` describes, whose log tells of `logged` seconds: a deterministic run's checkpoint
-    /// does not tell how long it took, and a log may be lost or lag behind.
+    /// The clock of the run that `metadata` describes, whose log counts `logged` seconds: a deterministic run's checkpoint
+    /// does not say how long it took, and a log may be lost or lag behind.
     #[must_use]
     pub fn new(metadata: &Metadata, logged: f64) -> Self {
         Self {
@@ -33,7 +33,7 @@ impl StepClock {
         self.seconds
     }
 
-    /// What a checkpoint may tell of the seconds: 0 of a deterministic run, since no two runs take the same time. The log
+    /// The seconds that a checkpoint may hold: 0 of a deterministic run, since no two runs take the same time. The log
     /// has them.
     #[must_use]
     pub fn recorded_seconds(&self) -> f64 {

@@ -160,7 +160,7 @@ impl<'a> Evaluator<'a> {
 }
 
 /// How many views to render next, of `left` ones, where `done` ones have taken `seconds` of `limit`: the first one
-/// always; later as many as fit, but at most as many as there are to judge by.
+/// always; later as many as fit, but at most as many as there are.
 fn affordable(limit: Option<f64>, seconds: f64, done: usize, left: usize) -> usize {
     match limit {
         None => left,

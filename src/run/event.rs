@@ -1,4 +1,4 @@
-//! What a run tells while it goes on: one list of events, and who listens.
+//! What a run reports while it goes on: one list of events, and who listens.
 
 use super::memory::MemoryUse;
 use super::scores::Means;

@@ -1,4 +1,4 @@
-//! What training takes of the host's memory and of the device's, told before a photo is loaded.
+//! What training takes of the host's memory and of the device's, estimated before a photo is loaded.
 
 use crate::camera::Camera;
 use crate::field::Plan;
@@ -91,7 +91,7 @@ fn fitting(needed: u64, available: u64) -> Option<Remedy> {
     })
 }
 
-/// Memory that the host can still give, within the limits of its container; `None` where the system does not tell.
+/// Memory that the host can still give, within the limits of its container; `None` where the system does not say.
 #[must_use]
 pub fn available_bytes() -> Option<u64> {
     let memory = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());

@@ -14,7 +14,7 @@ const GPU_STEPS: u32 = 20_000;
 /// resumed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrainOptions {
-    /// The dataset's path, as it was given; checkpoints tell it.
+    /// The dataset's path, as it was given; checkpoints hold it.
     pub dataset: String,
     /// A JSON file with settings.
     pub config: Option<PathBuf>,

@@ -1,7 +1,7 @@
 //! The page about a training run: one HTML file that needs neither network nor script.
 //!
 //! Data in, text out: the rows of a run's log ([`log`](super::log)), the scores of the test views and small pictures of some of
-//! them ([`views`], [`pictures`]) become curves, tables and images in one page.
+//! them ([`test_views`], [`pictures`]) become curves, tables and images in one page.
 
 mod colormap;
 mod curves;
@@ -47,7 +47,7 @@ pub struct Facts {
 }
 
 impl Facts {
-    /// What the description of a field tells of the run in `folder`, at its step and seconds.
+    /// What a checkpoint's metadata says about the run in `folder`, at its step and seconds.
     ///
     /// # Errors
     /// Never for settings that were read or resolved.

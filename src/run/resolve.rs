@@ -78,7 +78,7 @@ impl Resolved {
         TrainingPhotos { dataset, frames: &self.train }
     }
 
-    /// Whether there is room for training and its photos, on the host and on the device; tells what they take.
+    /// Whether there is room for training and its photos, on the host and on the device; reports what they take.
     ///
     /// # Errors
     /// When there is not; the message says how much there is, and what to do.

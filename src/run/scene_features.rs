@@ -7,7 +7,7 @@ use crate::field::SceneFeatures;
 use crate::photo::{BitDepth, Image};
 use anyhow::{Result, ensure};
 
-/// Photos that tell how bright a linear scene is.
+/// Photos that the brightness of a linear scene is measured on.
 const PHOTOS_FOR_GREY: usize = 8;
 pub(super) const NO_FRAME: &str = "the dataset has no frame to train on";
 

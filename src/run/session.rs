@@ -146,8 +146,8 @@ impl TrainingSession<'_> {
     /// Trains until the budget is spent or `stop` is raised, and saves.
     ///
     /// # Errors
-    /// When the run leads nowhere any more, the device was lost, or a file cannot be written. The newest
-    /// checkpoint stays; the message tells its step.
+    /// When training diverges, the device was lost, or a file cannot be written. The newest
+    /// checkpoint stays; the message names its step.
     pub fn train(&mut self, stop: &AtomicBool, observer: &mut dyn Observer) -> Result<TrainingEnd> {
         while !self.stepper.is_over() && !stop.load(Ordering::Relaxed) {
             let step = self.stepper.steps();
@@ -175,7 +175,7 @@ impl TrainingSession<'_> {
         Ok(TrainingEnd { step, seconds, loss: self.loss, skipped, interrupted })
     }
 
-    /// Logs a block and tells of it.
+    /// Logs a block and reports it.
     fn record(&mut self, block: Block, observer: &mut dyn Observer) -> Result<()> {
         let (step, seconds, stats) = (self.stepper.steps(), self.stepper.seconds(), block.stats);
         let clock = self.stepper.clock();
@@ -238,7 +238,7 @@ impl TrainingSession<'_> {
         Ok(())
     }
 
-    /// What there is to go on with.
+    /// The state to resume from.
     fn kept(&self) -> String {
         match self.saved.0 {
             0 => "nothing was saved yet".to_owned(),

@@ -32,7 +32,7 @@ pub struct Block {
 }
 
 impl Stepper {
-    /// A trainer at the time that `clock` tells.
+    /// A trainer at the time of `clock`.
     #[must_use]
     pub fn new(trainer: Trainer, clock: StepClock) -> Self {
         Self { stages: StageTimes::new(trainer.gpu()), trainer, clock, skipped: (0, 0) }
@@ -89,7 +89,7 @@ impl Stepper {
     /// Takes at least one and at most 16 steps, neither beyond the budget nor beyond `pause`, and waits.
     ///
     /// # Errors
-    /// When the run leads nowhere any more, or the device was lost.
+    /// When training diverges, or the device was lost.
     pub fn block(&mut self, pause: Budget) -> Result<Block> {
         let first = self.steps();
         let count = self.clock.steps_until(pause, first, BLOCK);
@@ -107,7 +107,7 @@ impl Stepper {
         Ok(Block { stats, seconds })
     }
 
-    /// Ends a run that leads nowhere any more.
+    /// Ends a run that diverges.
     fn check(&mut self, stats: &StepStats) -> Result<()> {
         let in_a_row = if stats.skipped == stats.steps { self.skipped.1 + stats.skipped } else { 0 };
         self.skipped = (self.skipped.0 + stats.skipped, in_a_row);

@@ -44,7 +44,7 @@ impl<'a> TrainingPhotos<'a> {
     /// the plan has them.
     ///
     /// # Errors
-    /// When a file cannot be read, the device cannot hold the photos, or they are not as the plan was told.
+    /// When a file cannot be read, the device cannot hold the photos, or they are not as the plan expects.
     pub fn load(&self, gpu: &Arc<Gpu>, plan: &Plan, observer: &mut dyn Observer) -> Result<TrainingViews> {
         let (dataset, frames) = (self.dataset, self.frames);
         let mut views = TrainingViews::new(gpu, plan, &self.cameras())?;

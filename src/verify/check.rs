@@ -80,7 +80,7 @@ fn whole(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
     Ok([vec![step], rendered_view::rendered_views(adapter)?].concat())
 }
 
-/// Runs every check; `progress` is told how many are done, how many there are, and which one is next.
+/// Runs every check; `progress` gets how many are done, how many there are, and which one is next.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel; the message names the check.

@@ -242,7 +242,7 @@ fn every_odd_log_gives_a_page() {
         ("{\"step\": 1", "1 line of the log"),
         ("{\"event\":\"start\"}", "There is no log of steps"),
         ("{\"step\":16}", "the dataset &lt;b&gt;moved"),
-        ("{\"step\":16,\"seconds\":1e308,\"loss\":-1,\"psnr\":0,\"samples\":0}", "Course"),
+        ("{\"step\":16,\"seconds\":1e308,\"loss\":-1,\"psnr\":0,\"samples\":0}", "Training curves"),
         ("{\"step\":16,\"seconds\":0,\"eval_psnr\":null}", "no log of steps"),
         ("{\"event\":\"stages\",\"stages\":[{}]}", "0 timed steps"),
         ("{\"event\":\"stages\"}", "no log of steps"),

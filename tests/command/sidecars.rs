@@ -1,4 +1,4 @@
-//! Trainings from end to end with everything that a photo may bring: masks, depth, alpha, 16 bits, linear light,
+//! Training runs from end to end with everything that a photo may bring: masks, depth, alpha, 16 bits, linear light,
 //! a size of its own and an odd lens.
 
 mod alpha;

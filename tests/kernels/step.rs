@@ -1,4 +1,4 @@
-//! Trainings of a tiny field over many steps.
+//! Training runs of a tiny field over many steps.
 
 use anyhow::Result;
 use nerf::verify::check::Setup;

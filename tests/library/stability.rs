@@ -1,4 +1,4 @@
-//! Trainings that would break a careless trainer: each guard has a test that fails without it.
+//! Training runs that would break a careless trainer: each guard has a test that fails without it.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use nerf::camera::Bounds;

@@ -1,4 +1,4 @@
-//! A few images of a dataset, decoded to tell what their alpha means.
+//! A few images of a dataset, decoded to find out what their alpha means.
 
 use anyhow::Result;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use crate::photo::BitDepth;
 use crate::photo::{AlphaMode, Reading};
 use crate::support::remedy::{Advised, Remedy};
 
-/// Images that are looked at to tell what their alpha means.
+/// Images that are looked at to find out what their alpha means.
 const MOST: usize = 4;
 
 /// The frames whose images are looked at.

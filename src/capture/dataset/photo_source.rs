@@ -188,7 +188,7 @@ impl PhotoSource {
     }
 }
 
-/// Which pixels of a mask mean that the photo's tell nothing. White is what reaches half of the mask's own
+/// Which pixels of a mask mean that the photo's are ignored. White is what reaches half of the mask's own
 /// brightest, so that masks of zeros and ones mean the same as those of zeros and 255s.
 fn ignored(brightness: &[u16], ignores: Ignores, invert: bool) -> Vec<bool> {
     let brightest = brightness.iter().copied().max().unwrap_or(0);

@@ -314,7 +314,7 @@ impl<'a> Map<'a> {
         format!(
             "{focus} at {}, {} from the cameras; the box is {} wide",
             point(directions.focus, directions.distance.median),
-            directions.distance.tell(length),
+            directions.distance.describe(length),
             length(2.0 * self.dataset.bounds.outer_half())
         )
     }

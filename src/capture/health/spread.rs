@@ -22,9 +22,9 @@ impl Spread {
         Self { min, median: values[values.len() / 2], max }
     }
 
-    /// In words: one number where all are the same as far as `say` tells.
+    /// As text: one number where all are the same as `say` prints them.
     #[must_use]
-    pub fn tell(&self, say: impl Fn(f64) -> String) -> String {
+    pub fn describe(&self, say: impl Fn(f64) -> String) -> String {
         let [min, median, max] = [self.min, self.median, self.max].map(say);
         if min == max { median } else { format!("{min} to {max}, median {median}") }
     }
@@ -37,8 +37,8 @@ mod tests {
     #[test]
     fn spreads_are_short_where_they_can_be() {
         let say = |value: f64| format!("{value:.1} m");
-        assert_eq!(Spread::of([3.0, 1.0, 2.0]).tell(say), "1.0 m to 3.0 m, median 2.0 m");
-        assert_eq!(Spread::of([1.0, 1.01]).tell(say), "1.0 m");
+        assert_eq!(Spread::of([3.0, 1.0, 2.0]).describe(say), "1.0 m to 3.0 m, median 2.0 m");
+        assert_eq!(Spread::of([1.0, 1.01]).describe(say), "1.0 m");
         assert_eq!(Spread::of([]), Spread::default());
     }
 }

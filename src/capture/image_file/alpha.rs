@@ -54,7 +54,7 @@ impl Image {
         self
     }
 
-    /// What display-referred pixels tell; nothing for linear ones.
+    /// What display-referred pixels show; nothing for linear ones.
     pub(crate) fn evidence(&self) -> Evidence {
         match &self.pixels {
             Pixels::Srgb8(pixels) => evidence(pixels, u8::MAX),

@@ -1,6 +1,6 @@
 //! What is wrong with a dataset as it was read.
 
-use crate::flags::told;
+use crate::flags::with_flags;
 use nerf::capture::dataset::Dataset;
 use nerf::capture::diagnostics::Diagnostic;
 use nerf::run::Estimate;
@@ -10,7 +10,7 @@ pub(super) fn found(dataset: &Dataset) -> usize {
     dataset.listed - dataset.missing.len()
 }
 
-/// What keeps training from beginning, and what the reader remarked.
+/// What keeps training from beginning, and what the reader noted.
 pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Diagnostic> {
     let mut problems = Vec::new();
     problems.extend(dataset.damaged.iter().map(Diagnostic::error));
@@ -30,7 +30,7 @@ pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Diagnostic> {
 pub(super) fn of_memory(estimate: &Estimate) -> Vec<Diagnostic> {
     let assumed = "there is no adapter on this machine, which training needs: the memory is that of a GPU with the \
                    default settings; see `nerf adapters`";
-    let excess = estimate.excess.iter().map(|error| Diagnostic::error(told(error)));
+    let excess = estimate.excess.iter().map(|error| Diagnostic::error(with_flags(error)));
     excess.chain(estimate.adapter.is_none().then(|| Diagnostic::note(assumed))).collect()
 }
 

@@ -1,4 +1,4 @@
-//! The report as text.
+//! The report for people, as text.
 
 use super::{Preflight, problems};
 use nerf::capture::dataset::Frame;
@@ -104,9 +104,9 @@ impl Preflight<'_> {
         let sets = count(self.dataset.distinct_cameras(), "set");
         let pixels = |value: f64| format!("{value:.1}");
         let degrees = |value: f64| format!("{value:.1}°");
-        let [fx, fy] = optics.focal_px.map(|focal| focal.tell(pixels));
+        let [fx, fy] = optics.focal_px.map(|focal| focal.describe(pixels));
         let focal = if fx == fy { format!("{fx} px") } else { format!("{fx} px in x, {fy} px in y") };
-        let [x, y] = optics.fov_degrees.map(|fov| fov.tell(degrees));
+        let [x, y] = optics.fov_degrees.map(|fov| fov.describe(degrees));
         vec![
             format!("{sets} of intrinsics; {lenses}; principal point {}", center(&optics.center_off)),
             format!("focal length {focal}"),
@@ -134,9 +134,9 @@ impl Preflight<'_> {
     fn about_coverage(&self) -> Vec<String> {
         let coverage = &self.survey.coverage;
         let (outer, inner) = (coverage.outer(), coverage.inner());
-        let mut line = format!("the box fills {} of the pictures", outer.tell(percent));
+        let mut line = format!("the box fills {} of the pictures", outer.describe(percent));
         if self.dataset.bounds.cascades > 1 {
-            line += &format!(", its inner cube {}", inner.tell(percent));
+            line += &format!(", its inner cube {}", inner.describe(percent));
         }
         let mut lines = vec![line];
         if outer.min < 0.5 * outer.median {
@@ -239,7 +239,7 @@ fn about_view_directions(directions: &ViewDirections, views: usize) -> Vec<Strin
         false => format!("the optical axes do not meet; taken for the focus: {focus}"),
     };
     let mut lines =
-        vec![focus, format!("distance of the cameras from it {}", directions.distance.tell(length))];
+        vec![focus, format!("distance of the cameras from it {}", directions.distance.describe(length))];
     lines.push(format!(
         "{} of the cameras see it; their axes pass it at {} of the distance, at worst {}",
         percent(directions.seeing),

@@ -146,7 +146,7 @@ fn charts(report: &Report) -> Result<Markup> {
     Ok(html! {
         @if !drawn.is_empty() {
             section {
-                h2 { "Course" }
+                h2 { "Training curves" }
                 div.charts { @for svg in &drawn { figure { (PreEscaped(svg)) } } }
             }
         }

@@ -29,7 +29,7 @@ pub struct ViewScores {
     pub psnr: f64,
     /// Structural similarity.
     pub ssim: f64,
-    /// How far away lies what it shows; `None` where the cameras have no focus to tell it by.
+    /// How far away lies what it shows; `None` where the cameras have no focus to measure it by.
     pub depths: Option<Depths>,
 }
 
@@ -56,7 +56,7 @@ pub struct Outcome {
     pub views: u64,
     /// Number of views that were not measured, because it would have taken too long.
     pub left_out: u64,
-    /// Part of all pixels that [`Depths::near_share`] counts; `None` where the cameras have no focus to tell it by.
+    /// Part of all pixels that [`Depths::near_share`] counts; `None` where the cameras have no focus to measure it by.
     pub near_share: Option<f64>,
 }
 
@@ -123,7 +123,7 @@ impl TestViews {
         })
     }
 
-    /// How far away lies what the views show; `None` where that is told of none.
+    /// How far away lies what the views show; `None` where that is known of none.
     #[must_use]
     pub fn depths(&self) -> Option<Depths> {
         let told: Vec<&Depths> = self.rows.iter().filter_map(|row| row.scores.depths.as_ref()).collect();

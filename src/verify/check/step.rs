@@ -144,7 +144,7 @@ fn compare_parameters(
         let least = 1e-3 * largest(gradient);
         let clear = (0..gradient.len()).filter(|&i| gradient[i].abs() > least);
         clear.for_each(|i| {
-            result.value(got[i], want[i], 1.0, || format!("{name}: {part} {i} after the step"))
+            result.value(got[i], want[i], 1.0, || format!("{name}: {part} {i} after the step"));
         });
     };
     let (gradients, trained) = (&want.gradients, &reference.model);
