@@ -53,10 +53,10 @@ impl Console {
         for note in &dataset.notes {
             match note.severity {
                 Severity::Note => {
-                    self.say(&format!("note: {}", message_with_flags(&note.message, note.remedy.as_ref())))
+                    self.say(&format!("note: {}", message_with_flags(&note.message, note.remedy.as_ref())));
                 }
                 Severity::Warning | Severity::Error => {
-                    self.warn(&message_with_flags(&note.message, note.remedy.as_ref()))
+                    self.warn(&message_with_flags(&note.message, note.remedy.as_ref()));
                 }
             }
         }

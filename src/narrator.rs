@@ -22,7 +22,7 @@ impl Observer for Narrator {
     fn notice(&mut self, event: &Event<'_>) {
         match *event {
             Event::Resolved { metadata, plan, gpu, test_views } => {
-                self.describe(metadata, plan, gpu, test_views)
+                self.describe(metadata, plan, gpu, test_views);
             }
             Event::Memory(memory) => self.say(&memory_line(&memory)),
             Event::Loading { done, all } => self.count("loading", (done, all), "images"),
