@@ -338,6 +338,7 @@ mod tests {
     fn settings_of_earlier_versions_are_left_out() {
         let metadata = checkpoint().metadata;
         let mut value = serde_json::to_value(&metadata).expect("JSON");
+        assert!(value["needs"].is_object(), "the key of the scene's features in every file so far");
         for (group, key) in RETIRED {
             value["config"][group][key] = 0.5.into();
         }

@@ -21,7 +21,7 @@ pub struct Plan {
     pub config: Arc<Config>,
     /// The parameters' layout.
     pub layout: Layout,
-    /// What the scene needs.
+    /// The scene's features, which kernels are linked for.
     pub features: SceneFeatures,
     /// Where the scene is.
     pub space: Space,
