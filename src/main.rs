@@ -5,8 +5,8 @@ mod commands;
 mod console;
 mod flags;
 mod narrator;
-mod outcome;
 mod progress;
+mod score_summary;
 
 use clap::Parser;
 use std::io::{ErrorKind, Write};

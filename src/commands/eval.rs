@@ -2,7 +2,7 @@
 
 use super::{Session, open_to_compare, writable_folder};
 use crate::cli::Eval;
-use crate::outcome::describe_near;
+use crate::score_summary::describe_near;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
 use nerf::capture::dataset::Dataset;

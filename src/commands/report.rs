@@ -3,7 +3,7 @@
 use super::{Session, open_to_compare};
 use crate::cli::Report as Args;
 use crate::flags::with_flags;
-use crate::outcome;
+use crate::score_summary;
 use anyhow::{Result, ensure};
 use nerf::camera::LensKind;
 use nerf::capture::dataset::Dataset;
@@ -37,9 +37,9 @@ pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
     let report = Report { facts, log, views };
     report.save(&out)?;
     let page = out.display().to_string();
-    let outcome = report.outcome();
-    let text =
-        outcome.map_or_else(|| page.clone(), |outcome| format!("{}; {page}", outcome::describe(&outcome)));
+    let summary = report.summary();
+    let text = summary
+        .map_or_else(|| page.clone(), |summary| format!("{}; {page}", score_summary::describe(&summary)));
     let mut result = json!({
         "report": page,
         "steps": report.steps(),
@@ -47,10 +47,10 @@ pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
         "skipped": report.log.skipped(),
         "without_views": report.views.as_ref().err(),
     });
-    outcome::add(&mut result, outcome.as_ref());
+    score_summary::add(&mut result, summary.as_ref());
     // What the log tells of them is no part of the page's pictures.
     result["views"] = json!(report.views.as_ref().map_or(0, TestViews::count));
-    session.console.fog(outcome.and_then(|outcome| outcome.near_share));
+    session.console.fog(summary.and_then(|summary| summary.near_share));
     session.print(&result, &text)
 }
 

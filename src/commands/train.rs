@@ -3,8 +3,8 @@
 use super::Session;
 use crate::cli::Train;
 use crate::flags::{message_with_flags, with_flags};
-use crate::outcome;
 use crate::progress::duration;
+use crate::score_summary;
 use anyhow::{Context, Result};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::diagnostics::Severity;
@@ -45,7 +45,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let end = training.train(&stop, &mut narrator)?;
     let views = training.evaluate(&end, &mut narrator)?.map_err(|reason| without_views(reason, args));
     drop(narrator);
-    let outcome = views.as_ref().ok().and_then(TestViews::outcome);
+    let summary = views.as_ref().ok().and_then(TestViews::summary);
     let report = training.write_report(&end, views);
     let folder = args.out.display().to_string();
     let mut result = json!({
@@ -56,14 +56,14 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         "skipped": end.skipped,
         "interrupted": end.interrupted,
     });
-    let mut text = summary(&end, training.metadata(), &folder);
-    if let Some(outcome) = outcome {
-        outcome::add(&mut result, Some(&outcome));
-        text = format!("{}; {text}", outcome::describe(&outcome));
-        if outcome.left_out > 0 {
+    let mut text = end_line(&end, training.metadata(), &folder);
+    if let Some(summary) = summary {
+        score_summary::add(&mut result, Some(&summary));
+        text = format!("{}; {text}", score_summary::describe(&summary));
+        if summary.left_out > 0 {
             text += &format!("; `nerf eval {folder} {}` measures all test views", args.dataset.display());
         }
-        session.console.fog(outcome.near_share);
+        session.console.fog(summary.near_share);
     }
     match report {
         Ok(page) => result["report"] = json!(page.display().to_string()),
@@ -122,7 +122,7 @@ fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
 }
 
 /// How the run went, in one line; `metadata` describes its beginning.
-fn summary(end: &TrainingEnd, metadata: &Metadata, folder: &str) -> String {
+fn end_line(end: &TrainingEnd, metadata: &Metadata, folder: &str) -> String {
     let steps = count(end.step as usize, "step");
     let mut text = format!("{steps} in {}, saved to {folder}", duration(end.seconds));
     match end.skipped {

@@ -19,7 +19,7 @@ use anyhow::{Context, Result};
 use std::io::Write;
 use std::path::Path;
 use std::time::SystemTime;
-use test_views::{Outcome, TestViews};
+use test_views::{ScoreSummary, TestViews};
 
 /// What is known about a training run; everything may be missing.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -100,11 +100,11 @@ impl Report {
     /// What the test views say of the field as it was left: as measured for this page, else as logged at its last
     /// step.
     #[must_use]
-    pub fn outcome(&self) -> Option<Outcome> {
-        let measured = self.views.as_ref().ok().and_then(TestViews::outcome);
+    pub fn summary(&self) -> Option<ScoreSummary> {
+        let measured = self.views.as_ref().ok().and_then(TestViews::summary);
         let logged = || {
             let row = self.log.result().filter(|row| self.steps().is_none_or(|steps| steps == row.step))?;
-            Some(Outcome {
+            Some(ScoreSummary {
                 psnr: row.eval_psnr?,
                 ssim: row.eval_ssim?,
                 views: row.views,

@@ -11,7 +11,7 @@ use nerf::field::renderer::View;
 use nerf::run::depths::{Depths, Onlookers};
 use nerf::run::log::Log;
 use nerf::run::report::pictures::{LONGEST_SIDE, Pair, Pictures};
-use nerf::run::report::test_views::{Outcome, TestViews, ViewScores};
+use nerf::run::report::test_views::{ScoreSummary, TestViews, ViewScores};
 use nerf::run::report::{Facts, Report};
 
 /// A log with every kind of row, and a torn last line.
@@ -264,10 +264,10 @@ fn every_odd_log_gives_a_page() {
 #[test]
 fn an_older_evaluation_is_not_the_result() {
     let mut report = report(FULL, Err(String::new()));
-    let logged = Outcome { psnr: 21.25, ssim: 0.75, views: 9, left_out: 0, near_share: None };
-    assert_eq!(report.outcome(), Some(logged));
+    let logged = ScoreSummary { psnr: 21.25, ssim: 0.75, views: 9, left_out: 0, near_share: None };
+    assert_eq!(report.summary(), Some(logged));
     report.facts.steps = Some(64);
-    assert_eq!(report.outcome(), None, "trained further since");
+    assert_eq!(report.summary(), None, "trained further since");
     report.facts.is_done = Some(false);
     assert!(page(&report).contains("interrupted before its end"));
 }

@@ -267,7 +267,7 @@ fn far_too_high_learning_rates() {
 /// In any number of threads, and with the clock at another time. A software driver's threads are counted by
 /// `LP_NUM_THREADS`.
 #[test]
-fn deterministic_trainings_are_equal_bit_for_bit() {
+fn deterministic_runs_are_equal_bit_for_bit() {
     for accumulation in ["auto", "fixed"] {
         let set = format!("accumulation={accumulation}");
         let bytes = |threads: &str, steps: &[&str]| {

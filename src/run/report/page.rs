@@ -84,7 +84,7 @@ fn latest<'a, T>(report: &'a Report, value: impl Fn(&'a Start) -> Option<T>) -> 
 /// What a reader must know before the numbers.
 fn warnings(report: &Report) -> Markup {
     let (skipped, damaged) = (report.log.skipped(), report.log.damaged);
-    let fog = report.outcome().and_then(|outcome| fog(outcome.near_share?));
+    let fog = report.summary().and_then(|summary| fog(summary.near_share?));
     html! {
         @if skipped > 0 {
             p.warning {
@@ -116,12 +116,12 @@ fn warnings(report: &Report) -> Markup {
 fn figures(report: &Report) -> Markup {
     let log = &report.log;
     let mut figures: Vec<(String, String)> = Vec::new();
-    if let Some(outcome) = report.outcome() {
-        let of = outcome.measured();
-        figures.push((format!("{:.2} dB", outcome.psnr), format!("PSNR of {of}")));
-        figures.push((format!("{:.4}", outcome.ssim), format!("SSIM of {of}")));
+    if let Some(summary) = report.summary() {
+        let of = summary.measured();
+        figures.push((format!("{:.2} dB", summary.psnr), format!("PSNR of {of}")));
+        figures.push((format!("{:.4}", summary.ssim), format!("SSIM of {of}")));
         let near =
-            outcome.near_share.map(|share| (percent(share), "of pixels near: a sign of fog".to_owned()));
+            summary.near_share.map(|share| (percent(share), "of pixels near: a sign of fog".to_owned()));
         figures.extend(near);
     } else if let Some(psnr) = log.steps.iter().rev().find_map(|row| row.psnr) {
         figures.push((format!("{psnr:.2} dB"), "PSNR of the rays trained on".to_owned()));

@@ -47,7 +47,7 @@ pub struct Row {
 
 /// What test views say together.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome {
+pub struct ScoreSummary {
     /// Mean of the views' PSNRs, in decibels.
     pub psnr: f64,
     /// Mean of the views' SSIMs.
@@ -60,7 +60,7 @@ pub struct Outcome {
     pub near_share: Option<f64>,
 }
 
-impl Outcome {
+impl ScoreSummary {
     /// `7 test views`, or `4 of 7 test views`.
     #[must_use]
     pub fn measured(&self) -> String {
@@ -111,10 +111,10 @@ impl TestViews {
 
     /// What they say together; `None` without views.
     #[must_use]
-    pub fn outcome(&self) -> Option<Outcome> {
+    pub fn summary(&self) -> Option<ScoreSummary> {
         let scores = || self.rows.iter().map(|row| &row.scores);
         let mean = |value: fn(&ViewScores) -> f64| scores().map(value).sum::<f64>() / self.rows.len() as f64;
-        (!self.rows.is_empty()).then(|| Outcome {
+        (!self.rows.is_empty()).then(|| ScoreSummary {
             psnr: mean(|view| view.psnr),
             ssim: mean(|view| view.ssim),
             views: self.rows.len() as u64,

@@ -47,16 +47,16 @@ impl TrainingSession<'_> {
             self.evaluation.at_end == EvaluationAtEnd::Share && !self.metadata.config.deterministic;
         let limit = is_limited.then_some(EVALUATION_SHARE * end.seconds);
         let views = TestViews::measure(evaluator, &self.test, limit, observer)?;
-        if let Some(outcome) = views.outcome() {
+        if let Some(summary) = views.summary() {
             self.log.write(&LogRow::Evaluation(log::Evaluation {
                 step: end.step.into(),
                 seconds: Some(end.seconds),
-                eval_psnr: Some(outcome.psnr),
-                eval_ssim: Some(outcome.ssim),
+                eval_psnr: Some(summary.psnr),
+                eval_ssim: Some(summary.ssim),
                 eval_seconds: Some(clock.elapsed().as_secs_f64()),
-                views: outcome.views,
-                views_left_out: Some(outcome.left_out),
-                near_share: outcome.near_share,
+                views: summary.views,
+                views_left_out: Some(summary.left_out),
+                near_share: summary.near_share,
             }))?;
         }
         Ok(Ok(views))
