@@ -1,4 +1,4 @@
-//! How fast photos are loaded, and in how much memory, from files to the first step of a training.
+//! How fast photos are loaded, and in how much memory, from files to the first step of a training run.
 //!
 //! `cargo bench --bench loading -- [COUNTxWIDTHxHEIGHT …]` writes JPEGs to a temporary folder (below `TMPDIR`), and
 //! loads each case in a process of its own, since a peak never falls. It prints a Markdown table; the peak is that of
@@ -12,7 +12,7 @@ use anyhow::{Context, Result, ensure};
 use image::{ImageBuffer, ImageFormat, Rgb};
 use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions};
 use nerf::config::Config;
-use nerf::field::train::Trainer;
+use nerf::field::trainer::Trainer;
 use nerf::field::{Field, Plan};
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::Reading;
@@ -76,7 +76,7 @@ impl Case {
     }
 }
 
-/// Loads the first `count` photos of a folder for a training with the adapter's defaults, and takes a step.
+/// Loads the first `count` photos of a folder for a training run with the adapter's defaults, and takes a step.
 fn load(folder: &Path, count: usize) -> Result<()> {
     let clock = Instant::now();
     let reading = Reading { max_images: Some(count), ..Reading::default() };

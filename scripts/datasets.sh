@@ -31,7 +31,7 @@ export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-/tmp}
     printf '| file | dialect | frames | cameras | lenses | assumed, repaired, or looks wrong (apart from the missing images) |\n'
     printf '| --- | --- | ---: | ---: | --- | --- |\n'
     for file in "$corpus"/*.json; do
-        # A dataset without images is one that a training would fail on.
+        # A dataset without images is one that training would fail on.
         { "$nerf" info "$file" --json --quiet 2>/dev/null || true; } | jq -r --arg file "$(basename "$file" .json)" '
             [.problems[] | select(.message | test("listed images is there|Vulkan, Metal or DX12|is held out for testing") | not)
                 | .severity + ": " + (.message | gsub("\\|"; "/"))] as $remarks

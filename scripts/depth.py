@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How true a run's depth is: against features triangulated from the photos, and against the plane that most of them lie on.
 
-Nothing that a training made is used for the truth. SIFT features are matched between photos and triangulated with the
+Nothing that a training run made is used for the truth. SIFT features are matched between photos and triangulated with the
 dataset's own cameras; one counts where its rays meet within 0.2 % of their length and two other photos or more agree on
 its depth within 3 %. The plane is found among all of them by RANSAC; it is told how many lie within 2 % of the median
 depth of it, and it is worth something only where that is most of them, as for a table.

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs nerf check on every path, and a short training, on several Vulkan drivers that need no GPU: the machine's own,
+# Runs nerf check on every path, and a short training run, on several Vulkan drivers that need no GPU: the machine's own,
 # SwiftShader, and the lavapipe of another Debian release. Drivers that compile and schedule differently find what one
 # alone forgives; SwiftShader has few bindings, no float atomics and small subgroups, as modest GPUs do.
 # usage: scripts/drivers.sh OUT [DRIVER…]
@@ -105,7 +105,7 @@ check() {
     fi
 }
 
-# A short training: its PSNR.
+# A short training run: its PSNR.
 train() {
     local text code=0
     text=$("${run[@]}" "$nerf_seen" train "$toys" --out "$run_folder" --config "$smoke" --steps 400 --overwrite \

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything about nerf on one machine's GPU in one call of nine minutes: what the adapter is and can do, whether the
-# kernels are right, where the time of a step goes, and how good trainings are after 1.5, 4, 12 and 60 s. What matters
+# kernels are right, where the time of a step goes, and how good training runs are after 1.5, 4, 12 and 60 s. What matters
 # most comes first, each part has its own time limit, and what is known is in RESULTS after every part. A part that fails
 # is told and does not stop the next. Runs in the folder that scripts/bundle.sh packed, without network or toolchain: with
 # bash, coreutils, grep, sed, tar and gzip.
@@ -19,7 +19,7 @@ unset CDPATH
 trap '' PIPE HUP
 
 # Names of the parts, seconds that they are given at most, and seconds without which they are not begun. Sweeps and
-# trainings carry their values in their names.
+# training runs carry their values in their names.
 parts=(
     'adapters             20   3'
     'ceilings             40   8'
@@ -190,7 +190,7 @@ part_sweep() {
     step "sweep_${setting}_$value" "$@" --warm "$(scaled 3)" --seconds "$(scaled 3)" --no-start
 }
 
-# A training and its score on all test views: the result's name, the dataset, and what else train takes.
+# A training run and its score on all test views: the result's name, the dataset, and what else train takes.
 train() {
     local name=$1 folder=$2 code=0
     shift 2
@@ -198,7 +198,7 @@ train() {
     [ ! -e "$work/$name/log.jsonl" ] || cp "$work/$name/log.jsonl" "$out/$name.log.jsonl"
     [ "$code" -eq 0 ] || return "$code"
     if ! grep -q '"psnr":[0-9]' "$out/$name.json"; then
-        printf 'error: the training has no PSNR: it diverged\n' >&2
+        printf 'error: the run has no PSNR: it diverged\n' >&2
         return 1
     fi
 }
@@ -220,7 +220,7 @@ part_render() {
             return
         fi
     done
-    printf 'error: no training to render\n' >&2
+    printf 'error: no run to render\n' >&2
     return 1
 }
 
@@ -236,7 +236,7 @@ part_deterministic() {
         printf 'the same, bit for bit\n' >"$out/deterministic.txt"
     else
         printf 'different\n' >"$out/deterministic.txt"
-        printf 'error: two deterministic trainings differ\n' >&2
+        printf 'error: two deterministic runs differ\n' >&2
         return 1
     fi
 }

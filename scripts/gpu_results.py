@@ -194,7 +194,7 @@ def sweeps_section(result):
     return table(["setting", "ms a step", "M samples/s", "MiB on the device"], rows)
 
 
-def trainings_section(result):
+def training_runs_section(result):
     rows = []
     for name in (name for name in result["parts"] if name.startswith("train_")):
         run = result["measured"].get(name)
@@ -228,7 +228,7 @@ def report(result):
         "What the adapter can do": guarded(ceilings_section, result),
         f"A step of the GPU defaults, generated photos of {side(result)}x{side(result)} pixels": guarded(step_section, result),
         "Other settings": guarded(sweeps_section, result),
-        "Trainings, all test views": guarded(trainings_section, result),
+        "Training runs, all test views": guarded(training_runs_section, result),
         "Rendering": f"A view of {side(result)}x{side(result)} pixels, median: {guarded(view_ms, result)} ms.",
         "What ran": table(["part", "status", "why", "seconds"], parts, left=3),
     }

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Everything that a change must pass: format, lints, documentation, and all tests, a short training with a
+# Everything that a change must pass: format, lints, documentation, and all tests, a short training run with a
 # bound on its PSNR among them. clippy and rustdoc share the metadata of the dependencies, so they come first.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -6,7 +6,7 @@
 #   OUT       folder for the results
 #   DATASET   trained on for the curves, besides the generated scene toys
 # environment:
-#   SECONDS_EACH   of the trainings behind the curves [default: 120]
+#   SECONDS_EACH   of the training runs behind the curves [default: 120]
 #   NERF_ADAPTER   what --adapter takes
 #   NERF, STUDIES  binaries to use instead of building them
 set -euo pipefail

@@ -1,7 +1,8 @@
 //! From files to cameras and photos: reading a dataset, and saying what is wrong with it.
 
 pub mod dataset;
+pub mod diagnostics;
 pub(crate) mod focus;
 pub mod health;
-pub mod image;
+pub mod image_file;
 pub(crate) mod scene_box;

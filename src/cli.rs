@@ -5,7 +5,7 @@ pub(crate) mod check;
 pub(crate) mod generate;
 pub(crate) mod info;
 mod one_of;
-pub(crate) mod reading;
+pub(crate) mod photo_flags;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::capture::dataset::HoldOut;
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// Train neural radiance fields from posed photos and render new views of them.
 ///
 /// Runs on any GPU with Vulkan, Metal or DX12, and on a CPU through a software driver.
-/// Results go to stdout, progress and remarks to stderr. Exit codes: 0 done, 1 failed, 2 usage.
+/// Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 failed, 2 usage.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true, propagate_version = true)]
 pub(crate) struct Cli {
@@ -39,10 +39,10 @@ pub(crate) struct Global {
     /// Print one JSON object as the result, also when failing
     #[arg(long, global = true)]
     pub(crate) json: bool,
-    /// No progress and no remarks
+    /// No progress and no messages
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
-    /// More remarks
+    /// More messages
     #[arg(long, short, global = true, action = ArgAction::Count, conflicts_with = "quiet")]
     pub(crate) verbose: u8,
 }
@@ -56,7 +56,7 @@ pub(crate) enum Command {
     Render(Render),
     /// Measure a trained field against photos: PSNR and SSIM
     Eval(Eval),
-    /// Write the page about a training: curves, test views, settings
+    /// Write the page about a training run: curves, test views, settings
     Report(Report),
     /// Look at a dataset before training on it: what was read, what was assumed, what is wrong
     Info(info::Info),
@@ -91,7 +91,7 @@ pub(crate) struct Train {
     /// Stop after this many seconds of training, those before --resume included [default: 300 on a CPU]
     ///
     /// Loading, compiling, evaluating and saving do not count. The learning rate falls along a cosine that
-    /// ends where the training does; with --steps too, whichever is nearer to its end counts.
+    /// ends where the run does; with --steps too, whichever is nearer to its end counts.
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) seconds: Option<f64>,
     /// Seed of every random number
@@ -109,10 +109,10 @@ pub(crate) struct Train {
     /// Without a test split, keep every N-th frame for testing, or none
     #[arg(long, value_name = "N|none", default_value = "8", value_parser = hold_out)]
     pub(crate) hold_out: HoldOut,
-    /// Go on with the training in RUN
+    /// Continue the run in RUN
     #[arg(long, conflicts_with = "overwrite")]
     pub(crate) resume: bool,
-    /// Replace the training in RUN
+    /// Replace the run in RUN
     #[arg(long)]
     pub(crate) overwrite: bool,
     /// Do not measure the test views at the end
@@ -120,13 +120,13 @@ pub(crate) struct Train {
     pub(crate) no_eval: bool,
     /// Measure all test views at the end, however long it takes
     ///
-    /// Otherwise it takes at most a tenth of the training's seconds: where not all test views fit, evenly spaced ones
-    /// are measured, at least one. A --deterministic training always measures all.
+    /// Otherwise it takes at most a tenth of the training time: where not all test views fit, evenly spaced ones
+    /// are measured, at least one. A --deterministic run always measures all.
     #[arg(long, conflicts_with = "no_eval")]
     pub(crate) eval_all: bool,
     /// How photos are read.
     #[command(flatten)]
-    pub(crate) reading: reading::Reading,
+    pub(crate) reading: photo_flags::PhotoFlags,
 }
 
 /// `nerf render`
@@ -150,7 +150,7 @@ pub(crate) struct Render {
     /// Also write depth as a grey PNG, white near and black far
     #[arg(long)]
     pub(crate) depth: bool,
-    /// Width in pixels; alone, the height follows [default: the file's, else the training's]
+    /// Width in pixels; alone, the height follows [default: the file's, else the run's]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) width: Option<u32>,
     /// Height in pixels; alone, the width follows
@@ -195,7 +195,7 @@ pub(crate) struct Eval {
     pub(crate) save: Option<PathBuf>,
     /// How photos are read.
     #[command(flatten)]
-    pub(crate) reading: reading::Reading,
+    pub(crate) reading: photo_flags::PhotoFlags,
 }
 
 /// `nerf report`
@@ -211,7 +211,7 @@ pub(crate) struct Report {
     pub(crate) out: Option<PathBuf>,
     /// How photos are read.
     #[command(flatten)]
-    pub(crate) reading: reading::Reading,
+    pub(crate) reading: photo_flags::PhotoFlags,
 }
 
 /// A file format to render to.

@@ -10,13 +10,13 @@ mod render;
 mod report;
 mod train;
 
-use crate::cli::reading::Reading;
+use crate::cli::photo_flags::PhotoFlags;
 use crate::cli::{Cli, Command, Global};
+use crate::console::Console;
 use crate::narrator::Narrator;
-use crate::remarks::Remarks;
 use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
-use nerf::field::checkpoint::About;
+use nerf::field::checkpoint::Metadata;
 use nerf::gpu::{Gpu, adapter};
 use nerf::run::TrainedField;
 use nerf::support::file::writable_folder;
@@ -28,7 +28,7 @@ use std::sync::Arc;
 
 /// Runs the subcommand.
 pub(crate) fn run(cli: &Cli) -> Result<()> {
-    let session = Session { global: &cli.global, remarks: Remarks::new(&cli.global) };
+    let session = Session { global: &cli.global, console: Console::new(&cli.global) };
     match &cli.command {
         Command::Train(args) => train::run(args, &session),
         Command::Render(args) => render::run(args, &session),
@@ -58,7 +58,7 @@ impl std::error::Error for Failed {}
 #[derive(Clone, Copy, Debug)]
 struct Session<'a> {
     global: &'a Global,
-    remarks: Remarks,
+    console: Console,
 }
 
 impl Session<'_> {
@@ -66,7 +66,7 @@ impl Session<'_> {
     fn open_gpu(&self) -> Result<Arc<Gpu>> {
         let gpu = Gpu::open(&adapter::choose(self.global.adapter.as_deref())?)?;
         let info = &gpu.info;
-        self.remarks.detail(&format!(
+        self.console.detail(&format!(
             "adapter {} ({:?}, {:?}, {} {})",
             info.name, info.device_type, info.backend, info.driver, info.driver_info
         ));
@@ -76,16 +76,16 @@ impl Session<'_> {
     /// Reads the checkpoint that `run` stands for.
     fn load_field(&self, run: &Path) -> Result<TrainedField> {
         let field = TrainedField::load(run)?;
-        let About { step, seconds, adapter, dataset, .. } = field.about();
+        let Metadata { step, seconds, adapter, dataset, .. } = field.metadata();
         let steps = count(*step as usize, "step");
         let path = field.path.display();
-        self.remarks.detail(&format!("{path}: {steps} in {seconds:.1} s on {adapter}, trained on {dataset}"));
+        self.console.detail(&format!("{path}: {steps} in {seconds:.1} s on {adapter}, trained on {dataset}"));
         Ok(field)
     }
 
-    /// Puts what a run tells into words.
+    /// Prints the events of a run.
     fn narrator(&self) -> Narrator {
-        Narrator::new(self.remarks)
+        Narrator::new(self.console)
     }
 
     /// Prints the result: `json` if asked for, else `text`.
@@ -99,8 +99,8 @@ impl Session<'_> {
     }
 }
 
-/// Opens a dataset to compare a field with: the photos are read as the command line says, else as for the training.
-fn open_to_compare(path: &Path, reading: &Reading, about: &About) -> Result<Dataset> {
-    let reading = reading.over(about.reading.clone());
+/// Opens a dataset to compare a field with: the photos are read as the command line says, else as for training.
+fn open_to_compare(path: &Path, reading: &PhotoFlags, metadata: &Metadata) -> Result<Dataset> {
+    let reading = reading.over(metadata.reading.clone());
     Dataset::open(path, &OpenOptions { reading, ..OpenOptions::default() })
 }

@@ -1,4 +1,4 @@
-//! Every number that shapes a training, with its default; read from JSON, stored in the checkpoint.
+//! Every number that shapes a training run, with its default; read from JSON, stored in the checkpoint.
 
 mod ranges;
 pub mod schedule;
@@ -189,14 +189,14 @@ pub enum Background {
     Color([f32; 3]),
 }
 
-/// The two sums of optical depth.
+/// Which optical depths the transmittance `T_i` of a sample sums up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Transmittance {
-    /// Before the sample.
+    /// `T_i = exp(−Σ_{j<i} τ_j)`, the light that reaches the sample (Mildenhall et al. 2020, eq. 3).
     #[default]
     Exclusive,
-    /// Up to and including the sample.
+    /// `T_i = exp(−Σ_{j≤i} τ_j)`, the light that leaves the sample, as Perlman 2023 prints it.
     Inclusive,
 }
 
@@ -204,7 +204,7 @@ pub enum Transmittance {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Accumulation {
-    /// Ordered on CPU adapters; elsewhere fixed where the training is deterministic, else float atomics, else
+    /// Ordered on CPU adapters; elsewhere fixed where the run is deterministic, else float atomics, else
     /// compare-exchange where there are none.
     #[default]
     Auto,

@@ -1,10 +1,10 @@
 //! The radiance field on a device: its parameters and kernels, training it and rendering it.
 
+mod buffers;
 mod capabilities;
 pub mod capacity;
 pub mod checkpoint;
 mod constants;
-mod demands;
 pub mod dispatch;
 mod features;
 mod kernels;
@@ -15,15 +15,15 @@ pub mod link;
 pub mod parameters;
 mod plan;
 pub mod records;
-pub mod render;
+pub mod renderer;
 mod shared;
 pub mod silhouette;
 mod space;
 pub mod stages;
 pub mod state;
-pub mod train;
+pub mod trainer;
+pub mod training_views;
 pub mod variants;
-pub mod views;
 pub mod visibility;
 mod workspace;
 
@@ -33,7 +33,7 @@ pub use constants::{RELATIVE_FLOOR, STEP_GROWTH, STEP_SHRINKAGE, dimension};
 pub use features::SceneFeatures;
 pub use link::Link;
 pub use plan::Plan;
-pub use shared::{Camera, Counters, LAYOUTS, Progress, RayResult, RayTarget, Step, Tile};
+pub use shared::{Counters, DeviceCamera, LAYOUTS, Progress, RayResult, RayTarget, Step, Tile};
 pub use space::Space;
 pub use stages::{backward, color, composite, density, march, occupancy, optimize, rays, viewing};
 pub use workspace::Workspace;
@@ -41,7 +41,7 @@ pub use workspace::Workspace;
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
 use anyhow::{Result, ensure};
-use checkpoint::{About, Checkpoint};
+use checkpoint::{Checkpoint, Metadata};
 use parameters::Numbers;
 use std::path::Path;
 use std::sync::Arc;
@@ -62,7 +62,7 @@ pub struct Field {
 enum StepExcess {
     /// This.
     Known(f32),
-    /// What the counters of a training say.
+    /// What the counters of a training run say.
     Counted(Buffer),
 }
 
@@ -83,7 +83,7 @@ impl Field {
     /// # Errors
     /// When the adapter cannot hold it.
     pub fn of(gpu: &Arc<Gpu>, checkpoint: &Checkpoint) -> Result<Self> {
-        let mut field = Self::allocate(gpu, checkpoint.about.plan(Capabilities::of(gpu)), false)?;
+        let mut field = Self::allocate(gpu, checkpoint.metadata.plan(Capabilities::of(gpu)), false)?;
         field.arrays.set_arrays(gpu, &field.plan, &checkpoint.state.arrays)?;
         field.step_excess = StepExcess::Known(checkpoint.state.step_excess);
         Ok(field)
@@ -93,14 +93,14 @@ impl Field {
     ///
     /// # Errors
     /// When the file cannot be used, or the adapter cannot hold the field.
-    pub fn load(gpu: &Arc<Gpu>, path: &Path) -> Result<(Self, About)> {
+    pub fn load(gpu: &Arc<Gpu>, path: &Path) -> Result<(Self, Metadata)> {
         let checkpoint = Checkpoint::load(path)?;
-        Ok((Self::of(gpu, &checkpoint)?, checkpoint.about))
+        Ok((Self::of(gpu, &checkpoint)?, checkpoint.metadata))
     }
 
     fn allocate(gpu: &Arc<Gpu>, plan: Plan, is_whole: bool) -> Result<Self> {
         let mut arrays = Workspace::default();
-        arrays.allocate(gpu, &plan.field_demands(is_whole))?;
+        arrays.allocate(gpu, &plan.field_buffers(is_whole))?;
         arrays.write(gpu, "levels", &plan.layout.levels);
         Ok(Self { gpu: Arc::clone(gpu), plan, arrays, is_whole, step_excess: StepExcess::Known(0.0) })
     }
@@ -123,7 +123,7 @@ impl Field {
         &self.gpu
     }
 
-    /// Back to where a training begins for which nothing can be in the `hidden` cells of the occupancy grid.
+    /// Back to where a training run begins for which nothing can be in the `hidden` cells of the occupancy grid.
     fn reset(&self, hidden: &[bool]) -> Result<()> {
         let start = self.plan.arrays().map(|array| (array.name, array.start(&self.plan, hidden)));
         self.set_arrays(&start.collect::<Vec<_>>())

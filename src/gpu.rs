@@ -3,10 +3,10 @@
 //! Nothing here knows what a radiance field is.
 
 pub mod adapter;
-pub mod banks;
 pub mod buffer;
-pub mod demand;
+pub mod buffer_spec;
 pub mod kernel;
+pub mod paged_array;
 pub mod pass;
 pub mod source;
 pub mod tensor;
@@ -27,7 +27,7 @@ pub struct Gpu {
     error: Arc<Mutex<Option<String>>>,
 }
 
-/// Features that speed the training up and are used wherever the adapter has them.
+/// Features that speed training up and are used wherever the adapter has them.
 pub const WANTED_FEATURES: wgpu::Features = wgpu::Features::SHADER_FLOAT32_ATOMIC
     .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
     .union(wgpu::Features::CLEAR_TEXTURE)
@@ -74,7 +74,7 @@ impl Gpu {
     }
 
     /// A device that is open already, for example that of a viewer: of the wanted features it uses those that it has. Its
-    /// errors are told by [`Gpu::check`] from now on.
+    /// errors are reported by [`Gpu::check`] from now on.
     #[must_use]
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
         let error = Arc::new(Mutex::new(None));

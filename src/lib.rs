@@ -9,8 +9,8 @@
 //!
 //! A [`Dataset`] has cameras and photos from files. A [`Field`] is a radiance field on a device ([`Gpu`]): a [`Trainer`]
 //! takes steps (rays, march, density, selection, colour, the fused render·loss·gradient kernel, backward, Adam), a
-//! [`Renderer`] shows it to any camera, and a [`Checkpoint`] keeps it on disk. A [`TrainingRun`] is a training as a whole,
-//! with its budget, log, checkpoints and evaluation, told to an [`Observer`]; the command line is a thin layer on it.
+//! [`Renderer`] shows it to any camera, and a [`Checkpoint`] keeps it on disk. A [`TrainingRun`] is a whole run,
+//! with its budget, log, checkpoints and evaluation, reported to an [`Observer`]; the command line is a thin layer on it.
 //!
 //! Without the default feature `cli` there is no terminal; without `run` there are no files but checkpoints: no datasets,
 //! no decoders, no charts, no command line.
@@ -27,7 +27,7 @@
 //!   ([`LensKind::depth_is_distance`]), in world units.
 //! - Gradients are called `d_<name>` for the derivative of the loss by `<name>`.
 //!
-//! # A training in code
+//! # Training in code
 //!
 //! ```no_run
 //! # #[cfg(feature = "run")]
@@ -75,8 +75,8 @@ pub use camera::{Bounds, Camera, Lens, LensKind};
 pub use config::Config;
 pub use field::Field;
 pub use field::checkpoint::Checkpoint;
-pub use field::render::{Renderer, View};
-pub use field::train::{StepStats, Trainer};
+pub use field::renderer::{Renderer, View};
+pub use field::trainer::{StepStats, Trainer};
 pub use gpu::Gpu;
 pub use photo::{Image, Photo};
 

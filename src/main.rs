@@ -2,11 +2,11 @@
 
 mod cli;
 mod commands;
+mod console;
 mod flags;
 mod narrator;
-mod outcome;
 mod progress;
-mod remarks;
+mod score_summary;
 
 use clap::Parser;
 use std::io::{ErrorKind, Write};
@@ -18,7 +18,7 @@ fn main() -> ExitCode {
     if is_broken_pipe(&error) {
         return ExitCode::SUCCESS;
     }
-    let message = flags::told(&error);
+    let message = flags::with_flags(&error);
     // Where even this cannot be written, the exit code still tells.
     if cli.global.json && !error.is::<commands::Failed>() {
         let _ = writeln!(std::io::stdout(), "{}", serde_json::json!({ "error": message }));

@@ -1,19 +1,19 @@
-//! What a run tells, in words on stderr.
+//! Reports the events of a run on stderr.
 
+use crate::console::Console;
 use crate::progress::{Progress, duration, short};
-use crate::remarks::Remarks;
 use nerf::field::Plan;
-use nerf::field::checkpoint::About;
+use nerf::field::checkpoint::Metadata;
 use nerf::field::optimize::accumulation_name;
 use nerf::gpu::Gpu;
-use nerf::run::memory::Memory;
+use nerf::run::memory::MemoryUse;
 use nerf::run::{Event, Observer, StepsTaken};
 use nerf::support::format::{bytes, count};
 
-/// Puts events into words, and long ones into progress.
+/// Prints events, and shows progress for long ones.
 #[derive(Debug)]
 pub(crate) struct Narrator {
-    remarks: Remarks,
+    console: Console,
     /// Of what is going on, and its title.
     progress: Option<(&'static str, Progress)>,
 }
@@ -21,7 +21,9 @@ pub(crate) struct Narrator {
 impl Observer for Narrator {
     fn notice(&mut self, event: &Event<'_>) {
         match *event {
-            Event::Resolved { about, plan, gpu, test_views } => self.describe(about, plan, gpu, test_views),
+            Event::Resolved { metadata, plan, gpu, test_views } => {
+                self.describe(metadata, plan, gpu, test_views);
+            }
             Event::Memory(memory) => self.say(&memory_line(&memory)),
             Event::Loading { done, all } => self.count("loading", (done, all), "images"),
             Event::Steps(taken) => {
@@ -40,23 +42,23 @@ impl Observer for Narrator {
 }
 
 impl Narrator {
-    /// Speaks as far as remarks are wanted.
-    pub(crate) fn new(remarks: Remarks) -> Self {
-        Self { remarks, progress: None }
+    /// Says as much as the console prints.
+    pub(crate) fn new(console: Console) -> Self {
+        Self { console, progress: None }
     }
 
     /// A line that stays.
     fn say(&self, line: &str) {
         match &self.progress {
             Some((_, progress)) => progress.say(line),
-            None => self.remarks.say(line),
+            None => self.console.say(line),
         }
     }
 
     /// The progress of what is called `title`, from now on if something else went on before.
     fn progress(&mut self, title: &'static str) -> &Progress {
         let current = self.progress.take().filter(|(current, _)| *current == title);
-        &self.progress.insert(current.unwrap_or_else(|| (title, Progress::new(self.remarks, title)))).1
+        &self.progress.insert(current.unwrap_or_else(|| (title, Progress::new(self.console, title)))).1
     }
 
     /// `done` of `all` things are done.
@@ -71,11 +73,11 @@ impl Narrator {
     }
 
     /// Says what was chosen, and what was left out.
-    fn describe(&self, about: &About, plan: &Plan, gpu: &Gpu, test_views: usize) {
-        let About { config, budget, bounds, splits, step, .. } = about;
+    fn describe(&self, metadata: &Metadata, plan: &Plan, gpu: &Gpu, test_views: usize) {
+        let Metadata { config, budget, bounds, splits, step, .. } = metadata;
         let train = count(splits.train.len(), "view");
-        self.remarks.say(&format!("{train} to train on, {test_views} to measure on"));
-        self.remarks.detail(&format!(
+        self.console.say(&format!("{train} to train on, {test_views} to measure on"));
+        self.console.detail(&format!(
             "scene box: centre {:.4}, half side {:.4}, {}; {}",
             bounds.center,
             bounds.half,
@@ -85,7 +87,7 @@ impl Narrator {
         let steps = budget.steps.map(|steps| count(steps as usize, "step"));
         let ends: Vec<_> = steps.into_iter().chain(budget.seconds.map(duration)).collect();
         let from = if *step > 0 { format!(", from step {step} on") } else { String::new() };
-        self.remarks.say(&format!(
+        self.console.say(&format!(
             "training on {}: {} grid levels from {} to {} cells, up to 2^{} entries each; networks {} wide; {} \
              samples per step; {} for {}{}",
             gpu.info.name,
@@ -99,11 +101,11 @@ impl Narrator {
             ends.join(" or "),
             from
         ));
-        self.remarks.say(&format!("left out: {}", plan.left_out().join(", ")));
+        self.console.say(&format!("left out: {}", plan.left_out().join(", ")));
     }
 }
 
-fn memory_line(memory: &Memory) -> String {
+fn memory_line(memory: &MemoryUse) -> String {
     let [host, device, photos] = [memory.host_bytes, memory.device_bytes, memory.photo_bytes].map(bytes);
     format!("memory: {host} on the host, {device} on the device, {photos} of it photos")
 }

@@ -1,6 +1,6 @@
 //! Photos as plain values: pixels, masks, depth, and how they are to be read. No files.
 
-pub mod color;
+pub mod color_space;
 mod image;
 mod reading;
 mod split;
@@ -17,7 +17,7 @@ use crate::support::remedy::{Advised, Remedy};
 pub struct Photo {
     /// The picture.
     pub image: Image,
-    /// `true` where a mask says that the pixel tells nothing, `[height * width]`; empty where every pixel counts.
+    /// `true` where a mask says to ignore the pixel, `[height * width]`; empty where every pixel counts.
     pub ignored: Vec<bool>,
     /// Depth in world units as the lens defines it (along the view axis for pinholes), `[height * width]`, 0
     /// where it is unknown; empty where the frame has none or it was not asked for.
@@ -25,7 +25,7 @@ pub struct Photo {
 }
 
 impl Photo {
-    /// Number of pixels that tell nothing.
+    /// Number of ignored pixels.
     pub fn count_ignored(&self) -> usize {
         self.ignored.iter().filter(|&&ignored| ignored).count()
     }
@@ -42,7 +42,7 @@ impl From<Image> for Photo {
     }
 }
 
-/// What keeps a training from beginning where masks ignore all of its photos.
+/// What keeps training from beginning where masks ignore all of its photos.
 pub(crate) fn nothing_counts(photos: usize) -> Advised {
     let photos = count(photos, "training photo");
     let found = format!("the masks ignore every pixel of all {photos}; they may be inverted: ");

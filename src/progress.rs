@@ -1,6 +1,6 @@
 //! Progress on stderr: a bar on a terminal, a line every few seconds elsewhere, nothing when quiet.
 
-use crate::remarks::Remarks;
+use crate::console::Console;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -16,15 +16,15 @@ const PARTS: f64 = 1000.0;
 /// How far something is.
 #[derive(Debug)]
 pub(crate) struct Progress {
-    remarks: Remarks,
+    console: Console,
     bar: Option<ProgressBar>,
     last_line: Mutex<Instant>,
 }
 
 impl Progress {
     /// Begins something called `title`.
-    pub(crate) fn new(remarks: Remarks, title: &str) -> Self {
-        let is_shown = !remarks.quiet && std::io::stderr().is_terminal();
+    pub(crate) fn new(console: Console, title: &str) -> Self {
+        let is_shown = !console.quiet && std::io::stderr().is_terminal();
         let bar = is_shown.then(|| {
             let bar = ProgressBar::with_draw_target(Some(PARTS as u64), ProgressDrawTarget::stderr());
             if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:24} {msg}") {
@@ -33,7 +33,7 @@ impl Progress {
             bar.set_prefix(title.to_owned());
             bar
         });
-        Self { remarks, bar, last_line: Mutex::new(Instant::now()) }
+        Self { console, bar, last_line: Mutex::new(Instant::now()) }
     }
 
     /// `part` of it in `[0, 1]` is done, and `line` says more.
@@ -44,9 +44,9 @@ impl Progress {
             return;
         }
         let Ok(mut last) = self.last_line.lock() else { return };
-        if !self.remarks.quiet && last.elapsed() >= BETWEEN_LINES {
+        if !self.console.quiet && last.elapsed() >= BETWEEN_LINES {
             *last = Instant::now();
-            self.remarks.say(&line());
+            self.console.say(&line());
         }
     }
 
@@ -58,8 +58,8 @@ impl Progress {
     /// A line that stays.
     pub(crate) fn say(&self, line: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| self.remarks.say(line)),
-            None => self.remarks.say(line),
+            Some(bar) => bar.suspend(|| self.console.say(line)),
+            None => self.console.say(line),
         }
     }
 }

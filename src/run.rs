@@ -2,9 +2,9 @@
 //! report.
 //!
 //! [`TrainOptions`] and a dataset become [`Resolved`] settings; a [`TrainingRun`] of them becomes a [`TrainingSession`],
-//! which takes the steps, evaluates test views, logs and saves. What happens is told to an [`Observer`]; nothing here
+//! which takes the steps, evaluates test views, logs and saves. What happens is reported to an [`Observer`]; nothing here
 //! prints. The pieces stand alone, too: [`TrainingPhotos`] puts photos on a device,
-//! [`Trainer::on`](crate::field::train::Trainer::on) is a trainer on a dataset, an [`Evaluator`] compares rendered views
+//! [`Trainer::on`](crate::field::trainer::Trainer::on) is a trainer on a dataset, an [`Evaluator`] compares rendered views
 //! with photos, and a [`TrainedField`] is a checkpoint to be rendered.
 
 mod clock;
@@ -12,22 +12,22 @@ pub mod depths;
 mod estimate;
 mod evaluate;
 mod event;
-mod features;
 mod folder;
 pub mod log;
 mod log_writer;
 pub mod memory;
 mod onlookers;
 mod options;
-mod photos;
 pub mod report;
 mod resolve;
 pub mod results;
+mod scene_features;
 mod scores;
 mod session;
 mod stage_times;
 mod stepper;
 mod trained;
+mod training_photos;
 
 pub use clock::StepClock;
 pub use estimate::Estimate;
@@ -36,10 +36,10 @@ pub use event::{Event, Observer, StepsTaken, Warning};
 pub use folder::RunFolder;
 pub use log_writer::LogWriter;
 pub use options::{EvaluationAtEnd, EvaluationOptions, TrainOptions};
-pub use photos::TrainingPhotos;
 pub use resolve::Resolved;
 pub use scores::{Means, Score, Scores};
 pub use session::{NoTestViews, TrainingEnd, TrainingRun, TrainingSession};
 pub use stage_times::StageTimes;
 pub use stepper::{Block, Stepper};
 pub use trained::TrainedField;
+pub use training_photos::TrainingPhotos;

@@ -1,4 +1,4 @@
-//! What knows nothing of radiance fields: charts, image metrics, files, numbers and remedies in words.
+//! What knows nothing of radiance fields: charts, image metrics, files, formatting of numbers, and remedies.
 
 #[cfg(feature = "run")]
 pub mod chart;

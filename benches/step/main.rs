@@ -17,7 +17,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::{Parser, ValueEnum};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::config::Config;
-use nerf::field::train::{StepStats, Trainer};
+use nerf::field::trainer::{StepStats, Trainer};
 use nerf::field::{Field, Plan};
 use nerf::gpu::timer::Timer;
 use nerf::gpu::{Gpu, adapter};
@@ -139,7 +139,7 @@ struct Throughput {
     samples_per_second_of_two_cores: Option<f64>,
 }
 
-/// A training ready for its first step.
+/// A training run ready for its first step.
 struct Run {
     gpu: Arc<Gpu>,
     trainer: Trainer,
@@ -199,10 +199,10 @@ fn say(text: &str) {
 
 fn generate(folder: &Path) -> Result<PathBuf> {
     say("generating the scene toys");
-    let options = scene::Generate {
-        views: scene::Views::of_total(100)?,
+    let options = scene::SceneOptions {
+        views: scene::ViewCounts::of_total(100)?,
         size: (100, 100),
-        ..scene::Generate::new("toys")
+        ..scene::SceneOptions::new("toys")
     };
     scene::generate(&options, folder, &|_| {})?;
     Ok(folder.to_owned())
@@ -284,7 +284,7 @@ impl Run {
         sum.seconds = clock.elapsed().as_secs_f64();
         sum.cpu_seconds = cpu.zip(cpu_seconds()).map(|(before, after)| after - before);
         if !sum.loss.is_finite() {
-            bail!("the loss is not finite any more: the training diverged");
+            bail!("the loss is not finite any more: training diverged");
         }
         let samples = sum.samples as f64;
         sum.samples_per_second = samples / sum.seconds.max(1e-9);

@@ -3,7 +3,7 @@
 use super::work::{Load, Work};
 use anyhow::{Result, ensure};
 use nerf::field::Plan;
-use nerf::field::train::StepStats;
+use nerf::field::trainer::StepStats;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;

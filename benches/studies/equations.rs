@@ -6,12 +6,12 @@ pub(crate) mod textbook;
 use super::Outcome;
 use anyhow::Result;
 use clap::Args;
+use nerf::config::Transmittance;
 use nerf::gpu::Gpu;
 use nerf::run::results::{circumstances, joined, markdown, write_json, write_text};
 use nerf::support::file::writable_folder;
 use nerf::verify::check::fused::Fused;
-use nerf::verify::check::{Forced, Subject};
-use nerf::verify::reference::Transmittance;
+use nerf::verify::check::{CheckedAdapter, Forced};
 use nerf::verify::reference::composite::{CompositeInput, CompositeOutput, composite};
 use nerf::verify::reference::vectors::{GoldenFile, GoldenRay, RayError};
 use serde::Serialize;
@@ -140,7 +140,7 @@ fn composited(
     rays: &[CompositeInput<'_>],
 ) -> Result<Vec<CompositeOutput>> {
     let longest = rays.iter().map(|ray| ray.s.len()).max().unwrap_or(0);
-    Fused::new(&Subject::new(gpu, Forced::default())?, convention, longest)?.run(rays)
+    Fused::new(&CheckedAdapter::new(gpu, Forced::default())?, convention, longest)?.run(rays)
 }
 
 /// The rays of a file by name, in the order in which the names appear.

@@ -5,7 +5,7 @@
 //! cargo bench --bench studies -- equations --out DIR
 //! ```
 //!
-//! They render rays whose results are known with the kernels of a training, and with the f64 reference beside them.
+//! They render rays whose results are known with the kernels of training, and with the f64 reference beside them.
 //! The tests include this file: what is here is compiled there too.
 
 pub(crate) mod equations;

@@ -8,7 +8,7 @@ struct Camera {
     right: vec3<f32>,
     height: u32,
     up: vec3<f32>,
-    // The photo's first row in the banks.
+    // The photo's first row in the pages.
     first_row: u32,
     back: vec3<f32>,
     // Pixels that can be drawn, at least 1.

@@ -3,18 +3,18 @@
 //! Opening one reads cameras and image headers; pixels are decoded on demand. World space is the
 //! dataset's own, in its own units.
 
+mod alpha_probe;
 mod frames;
 mod intrinsics;
 mod json;
 mod listing;
-mod located;
-mod look_ahead;
 pub(crate) mod notes;
 mod open;
 mod part;
-mod photo;
+mod photo_source;
 mod pose;
-mod samples;
+mod prefetch;
+mod resolved_frames;
 mod sidecars;
 mod splits;
 pub mod transforms;
@@ -25,11 +25,11 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use crate::camera::{Bounds, Camera};
+use crate::capture::diagnostics::Diagnostic;
 use crate::capture::focus;
 use crate::photo::{BitDepth, Reading, Split};
 pub use intrinsics::Intrinsics;
-pub use listing::{DepthEntry, Entry, Listing, SceneBox};
-pub use notes::{Note, Severity};
+pub use listing::{DepthEntry, FrameEntry, Listing, SceneBox};
 pub use open::read_cameras;
 pub use splits::{HoldOut, evenly_spaced, spread_order};
 
@@ -68,7 +68,7 @@ pub struct Dataset {
     /// Whether images are cut out: the first training image has transparent pixels.
     pub is_cutout: bool,
     /// What was assumed, repaired or looks wrong.
-    pub notes: Vec<Note>,
+    pub notes: Vec<Diagnostic>,
     /// The scene box.
     pub bounds: Bounds,
 }
@@ -92,7 +92,7 @@ pub struct Frame {
     pub has_depth: bool,
     /// Whether the alpha is in the image file.
     has_own_alpha: bool,
-    source: photo::Source,
+    source: photo_source::PhotoSource,
 }
 
 /// Choices when opening a dataset.
@@ -151,7 +151,7 @@ impl Dataset {
     #[must_use]
     pub fn focus(&self) -> Option<DVec3> {
         let cameras = self.distinct_images().into_iter().map(|index| &self.frames[index].camera);
-        let axes: Vec<_> = cameras.map(focus::Axis::of).collect();
+        let axes: Vec<_> = cameras.map(focus::OpticalAxis::of).collect();
         let found = (!axes.is_empty()).then(|| focus::find(&axes))?;
         (found.kind == focus::FocusKind::Crossing).then_some(found.point)
     }

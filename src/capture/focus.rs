@@ -6,7 +6,7 @@ use crate::camera::{Camera, Geometry};
 
 /// What matters about a camera here, in world space.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Axis {
+pub(crate) struct OpticalAxis {
     pub(crate) origin: DVec3,
     /// Unit direction through the middle of the image.
     pub(crate) direction: DVec3,
@@ -19,7 +19,7 @@ pub(crate) struct Axis {
 /// A lens that sees more to the side than this is not pointed at all it sees.
 const WIDEST_TANGENT: f64 = 1.0;
 
-impl Axis {
+impl OpticalAxis {
     pub(crate) fn of(camera: &Camera) -> Self {
         let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
         let middle = camera.ray(0.5 * size);
@@ -82,7 +82,7 @@ pub(crate) enum FocusKind {
 }
 
 /// Finds the focus of at least one axis.
-pub(crate) fn find(axes: &[Axis]) -> Focus {
+pub(crate) fn find(axes: &[OpticalAxis]) -> Focus {
     let mean = axes.iter().map(|axis| axis.origin).sum::<DVec3>() / axes.len() as f64;
     let spread = axes.iter().map(|axis| axis.origin.distance(mean));
     let spread = spread.fold(0.0, f64::max);
@@ -106,14 +106,14 @@ fn across(direction: DVec3) -> DMat3 {
 }
 
 /// Axes within a fraction of a degree say nothing about where they meet.
-fn are_parallel(axes: &[Axis]) -> bool {
+fn are_parallel(axes: &[OpticalAxis]) -> bool {
     let sum: DMat3 = axes.iter().map(|axis| across(axis.direction)).sum();
     (sum * (axes.len() as f64).recip()).determinant() < 1e-5
 }
 
 /// The least-squares crossing of the axes, with axes that miss it or point away from it counting less
 /// and less; `None` where most do.
-fn crossing(axes: &[Axis], mean: DVec3, spread: f64) -> Option<Focus> {
+fn crossing(axes: &[OpticalAxis], mean: DVec3, spread: f64) -> Option<Focus> {
     if are_parallel(axes) || spread == 0.0 {
         return None;
     }
@@ -153,14 +153,14 @@ fn crossing(axes: &[Axis], mean: DVec3, spread: f64) -> Option<Focus> {
 }
 
 /// A single axis, parallel ones, or ones that fan out.
-fn ahead(axes: &[Axis], mean: DVec3, heading: DVec3) -> Focus {
+fn ahead(axes: &[OpticalAxis], mean: DVec3, heading: DVec3) -> Focus {
     let seeing = axes.iter().filter(|axis| axis.sees(DVec3::ZERO)).count();
     if seeing * 10 >= axes.len() * 8 {
         // Renderers put the object at the origin.
         let distance = -mean.dot(heading);
         return Focus { point: mean + distance * heading, distance, kind: FocusKind::Origin };
     }
-    let away = |axis: &Axis| (across(heading) * (axis.origin - mean)).length();
+    let away = |axis: &OpticalAxis| (across(heading) * (axis.origin - mean)).length();
     let reach = axes.iter().map(away).fold(0.0, f64::max);
     // Where the view of each camera reaches over all the others; a single camera has no such distance,
     // and its distance from the origin is the only length there is.

@@ -1,35 +1,36 @@
 //! What is healthy or wrong about a dataset, seen from its cameras and pixels before anything is trained.
 //!
-//! [`Survey`] looks at cameras and scene box, [`photos::Look`] at one photo and [`photos::Gallery`] at all of them,
-//! and [`map`] draws the cameras. Every [`Finding`] says what is wrong, how it was seen, and what to do.
+//! [`Survey`] looks at cameras and scene box, [`gallery::Look`] at one photo and [`gallery::Gallery`] at all of them,
+//! and [`map`] draws the cameras. Every [`Diagnostic`] says what is wrong, how it was seen, and what to do.
 
-mod axes;
+mod axis_convention;
 mod coverage;
-mod finding;
-mod gaze;
+pub mod gallery;
 pub mod map;
 mod optics;
-pub mod photos;
 mod poses;
+mod spread;
+mod view_directions;
 
+use crate::capture::diagnostics::Diagnostic;
 pub use coverage::Coverage;
-pub use finding::{Finding, Severity, Spread};
-pub use gaze::{Arrangement, Gaze};
 pub use optics::Optics;
+pub use spread::Spread;
+pub use view_directions::{Arrangement, ViewDirections};
 
 use crate::camera::Camera;
 use crate::capture::dataset::Dataset;
-use crate::capture::focus::{Axis, Focus, find};
+use crate::capture::focus::{Focus, OpticalAxis, find};
+use gallery::Gallery;
 use glam::DVec3;
-use photos::Gallery;
 
-/// What the cameras of a dataset tell.
+/// What the cameras of a dataset show.
 #[derive(Clone, Debug)]
 pub struct Survey {
     /// Indices of the frames that were looked at: one per image, where several splits list it.
     pub views: Vec<usize>,
     /// Where the cameras look.
-    pub gaze: Gaze,
+    pub directions: ViewDirections,
     /// How much of the scene box they see.
     pub coverage: Coverage,
     /// Focal lengths, sizes and lenses.
@@ -37,35 +38,35 @@ pub struct Survey {
     /// Pairs of frames with different images and the same pose.
     pub same_pose: Vec<[usize; 2]>,
     /// What looks wrong, worst first.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<Diagnostic>,
 }
 
 impl Survey {
     /// Looks at all frames of a dataset, of which there is at least one.
     #[must_use]
     pub fn of(dataset: &Dataset) -> Self {
-        let scene = Scene::new(dataset);
-        let gaze = Gaze::of(&scene);
+        let scene = CameraSet::new(dataset);
+        let directions = ViewDirections::of(&scene);
         let coverage = Coverage::of(&scene);
         let optics = Optics::of(&scene);
-        let misread = axes::examine(&scene, &gaze);
+        let misread = axis_convention::examine(&scene, &directions);
         let mut findings = Vec::new();
         if misread.is_empty() {
             // Where all poses are read the wrong way, single ones tell nothing.
-            findings.extend(poses::outliers(&scene, &gaze));
-            findings.extend(gaze.findings(&scene));
+            findings.extend(poses::outliers(&scene, &directions));
+            findings.extend(directions.findings(&scene));
             findings.extend(coverage.findings(&scene));
         }
         findings.extend(misread);
         findings.extend(optics.findings(&scene));
         findings.sort_by_key(|finding| finding.severity);
         let same_pose = poses::repeated(&scene);
-        Self { views: scene.views, gaze, coverage, optics, same_pose, findings }
+        Self { views: scene.views, directions, coverage, optics, same_pose, findings }
     }
 
     /// What stands out among the photos, of those that were looked at.
     #[must_use]
-    pub fn findings_with(&self, gallery: Option<&Gallery>, dataset: &Dataset) -> Vec<Finding> {
+    pub fn findings_with(&self, gallery: Option<&Gallery>, dataset: &Dataset) -> Vec<Diagnostic> {
         let Some(gallery) = gallery else {
             return poses::about_repeated(dataset, &self.same_pose, None).into_iter().collect();
         };
@@ -79,19 +80,20 @@ impl Survey {
 }
 
 /// The dataset as its examinations see it.
-struct Scene<'a> {
+struct CameraSet<'a> {
     dataset: &'a Dataset,
     /// Indices of the frames, each image once.
     views: Vec<usize>,
     /// One per view.
-    axes: Vec<Axis>,
+    axes: Vec<OpticalAxis>,
     focus: Focus,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> CameraSet<'a> {
     fn new(dataset: &'a Dataset) -> Self {
         let views = dataset.distinct_images();
-        let axes: Vec<Axis> = views.iter().map(|&index| Axis::of(&dataset.frames[index].camera)).collect();
+        let axes: Vec<OpticalAxis> =
+            views.iter().map(|&index| OpticalAxis::of(&dataset.frames[index].camera)).collect();
         let focus = find(&axes);
         Self { dataset, views, axes, focus }
     }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::dataset::SceneBox;
 use super::dataset::notes::Notes;
-use super::focus::{Axis, Focus, FocusKind, find, median};
+use super::focus::{Focus, FocusKind, OpticalAxis, find, median};
 use crate::camera::{Bounds, Camera, Ray};
 
 /// What is known about the surroundings of the subject.
@@ -28,7 +28,7 @@ impl Bounds {
         surroundings: Surroundings,
         notes: &mut Notes,
     ) -> Self {
-        let axes: Vec<Axis> = cameras.iter().map(|camera| Axis::of(camera)).collect();
+        let axes: Vec<OpticalAxis> = cameras.iter().map(|camera| OpticalAxis::of(camera)).collect();
         let focus = find(&axes);
         let found = Self::found(&axes, &focus, surroundings);
         let Some(scene_box) = scene_box else {
@@ -60,7 +60,7 @@ impl Bounds {
     }
 
     /// Why this box cannot be meant for these cameras. Exporters write the same box whatever the units.
-    fn misses(&self, axes: &[Axis], focus: &Focus) -> Option<String> {
+    fn misses(&self, axes: &[OpticalAxis], focus: &Focus) -> Option<String> {
         // What the cameras look at may lie a little off the inner cube where there are more around it.
         let core = f64::min(2.0 * self.half, self.outer_half());
         let off = (focus.point - self.center).abs().max_element();
@@ -79,11 +79,11 @@ impl Bounds {
         (2 * hits < axes.len()).then(|| format!("only {hits} of {} cameras look into it", axes.len()))
     }
 
-    fn is_hit_by(&self, axis: &Axis) -> bool {
+    fn is_hit_by(&self, axis: &OpticalAxis) -> bool {
         self.meets(self.outer_half(), &Ray { origin: axis.origin, direction: axis.direction })
     }
 
-    fn found(axes: &[Axis], focus: &Focus, surroundings: Surroundings) -> Self {
+    fn found(axes: &[OpticalAxis], focus: &Focus, surroundings: Surroundings) -> Self {
         let whose = match focus.kind {
             FocusKind::Crossing => "around the point the cameras look at",
             FocusKind::Origin => "around the origin, which the cameras see; their axes do not cross",
@@ -123,7 +123,7 @@ impl Bounds {
 }
 
 /// Half the width of the typical view at the focus, in world units.
-fn footprint(axes: &[Axis], focus: &Focus) -> f64 {
+fn footprint(axes: &[OpticalAxis], focus: &Focus) -> f64 {
     match focus.kind {
         FocusKind::Inside => median(axes.iter().map(|axis| axis.half_width_at(focus.distance))),
         _ => median((axes.iter()).map(|axis| axis.half_width_at(axis.origin.distance(focus.point)))),
@@ -131,7 +131,7 @@ fn footprint(axes: &[Axis], focus: &Focus) -> f64 {
 }
 
 /// Whether the cameras circle the focus at about one distance, as object captures do.
-fn is_orbit(axes: &[Axis], focus: &Focus) -> bool {
+fn is_orbit(axes: &[OpticalAxis], focus: &Focus) -> bool {
     let distances = axes.iter().map(|axis| axis.origin.distance(focus.point));
     let even = { distances }.all(|d| (d / focus.distance - 1.0).abs() < 0.25);
     match focus.kind {

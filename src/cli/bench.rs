@@ -30,10 +30,10 @@ pub(crate) struct Training {
     /// Train every config with this seed; may be repeated [default: the config's]
     #[arg(long, value_name = "K")]
     pub(crate) seed: Vec<u32>,
-    /// Stop each training after this many seconds [default: 300 on a CPU]
+    /// Stop each run after this many seconds [default: 300 on a CPU]
     #[arg(long, value_name = "S", value_parser = super::seconds, allow_negative_numbers = true)]
     pub(crate) seconds: Option<f64>,
-    /// Stop each training after this many steps [default: 20000 on a GPU]
+    /// Stop each run after this many steps [default: 20000 on a GPU]
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<u32>,
     /// Test views to measure along the way, evenly spaced; the end measures all

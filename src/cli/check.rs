@@ -4,11 +4,11 @@ use super::one_of::OneOf;
 use clap::Args;
 use nerf::config::Accumulation;
 use nerf::field::layer::Product;
-use nerf::gpu::tensor::Memory;
+use nerf::gpu::tensor::TensorMemory;
 use std::path::PathBuf;
 
 /// Help of the choice that is left to the plan.
-const AUTO: &str = "What a training takes on this adapter";
+const AUTO: &str = "What training takes on this adapter";
 
 /// `nerf check`
 #[derive(Args, Debug)]
@@ -23,7 +23,7 @@ pub(crate) struct Check {
     // Written with its path, an option is one of the values, not an argument that may be missing.
     /// Where tensors live
     #[arg(long, value_parser = memories(), default_value = "auto")]
-    pub(crate) memory: std::option::Option<Memory>,
+    pub(crate) memory: std::option::Option<TensorMemory>,
     /// How the networks are multiplied: rows per thread, or shared weights
     #[arg(long, value_parser = products(), default_value = "auto")]
     pub(crate) product: std::option::Option<Product>,
@@ -39,11 +39,11 @@ fn accumulations() -> OneOf<Accumulation> {
     ])
 }
 
-fn memories() -> OneOf<Option<Memory>> {
+fn memories() -> OneOf<Option<TensorMemory>> {
     let values = [
         ("auto", AUTO, None),
-        ("buffers", "Storage buffers", Some(Memory::Buffers)),
-        ("textures", "Textures", Some(Memory::Textures)),
+        ("buffers", "Storage buffers", Some(TensorMemory::Buffers)),
+        ("textures", "Textures", Some(TensorMemory::Textures)),
     ];
     OneOf::new(values.map(|(name, help, memory)| (name.to_owned(), help, memory)))
 }

@@ -1,6 +1,6 @@
 //! What `nerf info` takes.
 
-use super::reading::Reading;
+use super::photo_flags::PhotoFlags;
 use clap::Args;
 use nerf::capture::dataset::HoldOut;
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ pub(crate) struct Info {
     pub(crate) hold_out: HoldOut,
     /// How photos are read.
     #[command(flatten)]
-    pub(crate) reading: Reading,
+    pub(crate) reading: PhotoFlags,
 }
 
 fn map(text: &str) -> Result<PathBuf, String> {

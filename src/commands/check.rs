@@ -6,7 +6,7 @@ use crate::progress::{Progress, duration};
 use anyhow::Result;
 use nerf::config::Accumulation;
 use nerf::verify::check::fused::{BOUND, golden_rays};
-use nerf::verify::check::{self, Forced, Subject, Tally};
+use nerf::verify::check::{self, CheckResult, CheckedAdapter, Forced};
 use nerf::verify::reference::vectors::{GoldenFile, RayError};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -15,14 +15,14 @@ use std::time::Instant;
 pub(super) fn run(args: &Check, session: &Session<'_>) -> Result<()> {
     let file = args.vectors.as_deref().map(GoldenFile::load).transpose()?;
     let gpu = session.open_gpu()?;
-    let subject = Subject::new(&gpu, forced(args))?;
-    let heading = format!("adapter  {}\npath     {}", gpu.info.name, subject.describe()?);
+    let adapter = CheckedAdapter::new(&gpu, forced(args))?;
+    let heading = format!("adapter  {}\npath     {}", gpu.info.name, adapter.describe()?);
     if session.global.json {
-        session.remarks.say(&heading);
+        session.console.say(&heading);
     }
     match (&args.vectors, &file) {
-        (Some(path), Some(file)) => rays(&subject, file, path, &heading, session),
-        _ => kernels(&subject, &heading, session),
+        (Some(path), Some(file)) => rays(&adapter, file, path, &heading, session),
+        _ => kernels(&adapter, &heading, session),
     }
 }
 
@@ -36,34 +36,34 @@ fn forced(args: &Check) -> Forced {
 }
 
 /// Checks all kernels and prints the table.
-fn kernels(subject: &Subject, heading: &str, session: &Session<'_>) -> Result<()> {
+fn kernels(adapter: &CheckedAdapter, heading: &str, session: &Session<'_>) -> Result<()> {
     let start = Instant::now();
-    let progress = Progress::new(session.remarks, "checking");
-    let tallies = check::run(subject, &|done, all, name| {
+    let progress = Progress::new(session.console, "checking");
+    let results = check::run(adapter, &|done, all, name| {
         progress.update(done as f64 / all as f64, || format!("{name} ({} of {all})", done + 1));
     })?;
     drop(progress);
-    let broken = tallies.iter().filter(|tally| !tally.pass).count();
-    let worst = tallies.iter().fold(0.0, |worst: f64, tally| worst.max(tally.worst));
-    let mut lines = vec![heading.to_owned(), table(&tallies)];
+    let broken = results.iter().filter(|result| !result.pass).count();
+    let worst = results.iter().fold(0.0, |worst: f64, result| worst.max(result.worst));
+    let mut lines = vec![heading.to_owned(), table(&results)];
     let time = duration(start.elapsed().as_secs_f64());
     let verdict = match broken {
-        0 => format!("all {} bounds are kept", tallies.len()),
-        _ => format!("{broken} of {} bounds are broken", tallies.len()),
+        0 => format!("all {} bounds are kept", results.len()),
+        _ => format!("{broken} of {} bounds are broken", results.len()),
     };
     lines.push(format!("{verdict}; the checks took {time}"));
     let result = json!({
-        "adapter": subject.gpu.info.name, "pass": broken == 0, "worst": worst, "kernels": tallies, "rays": []
+        "adapter": adapter.gpu.info.name, "pass": broken == 0, "worst": worst, "kernels": results, "rays": []
     });
     finish(session, &result, &lines.join("\n"), broken == 0, verdict)
 }
 
-/// One line per tally, and under it the worst case of one whose bound is broken.
-fn table(tallies: &[Tally]) -> String {
-    let width = tallies.iter().map(|tally| tally.name.chars().count()).max().unwrap_or(0);
+/// One line per result, and under it the worst case of one whose bound is broken.
+fn table(results: &[CheckResult]) -> String {
+    let width = results.iter().map(|result| result.name.chars().count()).max().unwrap_or(0);
     let mut lines =
         vec![format!("{:width$}  {:>8}  {:>8}  {:>8}        bound by", "kernel", "cases", "worst", "bound")];
-    for Tally { name, cases, worst, bound, pass, source, case } in tallies {
+    for CheckResult { name, cases, worst, bound, pass, source, case } in results {
         let verdict = if *pass { "pass" } else { "FAIL" };
         lines.push(format!("{name:width$}  {cases:>8}  {worst:>8.1e}  {bound:>8.1e}  {verdict}  {source}"));
         if !pass {
@@ -75,13 +75,13 @@ fn table(tallies: &[Tally]) -> String {
 
 /// Checks the rays of a file and prints them.
 fn rays(
-    subject: &Subject,
+    adapter: &CheckedAdapter,
     file: &GoldenFile,
     path: &Path,
     heading: &str,
     session: &Session<'_>,
 ) -> Result<()> {
-    let errors = golden_rays(subject, file)?;
+    let errors = golden_rays(adapter, file)?;
     let pass = |error: &RayError| error.finite && error.error <= BOUND;
     let broken = errors.iter().filter(|error| !pass(error)).count();
     let worst = errors.iter().fold(0.0, |worst: f64, error| worst.max(error.error));
@@ -102,7 +102,7 @@ fn rays(
     };
     lines.push(format!("{verdict}; worst {worst:.1e}, {:?} transmittance", file.transmittance));
     let result = json!({
-        "adapter": subject.gpu.info.name, "pass": broken == 0, "worst": worst, "kernels": [], "rays": entries
+        "adapter": adapter.gpu.info.name, "pass": broken == 0, "worst": worst, "kernels": [], "rays": entries
     });
     finish(session, &result, &lines.join("\n"), broken == 0, verdict)
 }

@@ -2,25 +2,25 @@
 
 use super::{Session, open_to_compare, writable_folder};
 use crate::cli::Eval;
-use crate::outcome::describe_near;
+use crate::score_summary::describe_near;
 use anyhow::{Context, Result, ensure};
 use nerf::camera::LensKind;
 use nerf::capture::dataset::Dataset;
-use nerf::capture::image::write_png_rgba8;
+use nerf::capture::image_file::write_png_rgba8;
 use nerf::photo::Split;
-use nerf::photo::color::{ColorSpace, opaque_srgb8};
+use nerf::photo::color_space::{ColorSpace, opaque_srgb8};
 use nerf::run::{Compared, Evaluator, Means, Score, TrainedField};
 use nerf::support::format::{count, few};
 use serde_json::{Value, json};
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     let field = session.load_field(&args.run)?;
-    let dataset = open_to_compare(&args.dataset, &args.reading, field.about())?;
+    let dataset = open_to_compare(&args.dataset, &args.reading, field.metadata())?;
     let indices = frames(&field, &dataset, args.split, session)?;
     ensure!(
-        dataset.is_hdr == field.about().needs.hdr,
+        dataset.is_hdr == field.metadata().features.hdr,
         "the field was trained on {} images, and {} has {} images; name the dataset it was trained on",
-        range(field.about().needs.hdr),
+        range(field.metadata().features.hdr),
         args.dataset.display(),
         range(dataset.is_hdr)
     );
@@ -33,7 +33,7 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     evaluator.background = args.background.color();
     let scores = measure(evaluator, &indices, args, session)?;
     let means = Means::of(&scores).context("there was nothing to measure")?;
-    session.remarks.fog(means.near_share);
+    session.console.fog(means.near_share);
     session.print(&report(args, &field, &scores, means), &describe(args, &scores, means, field.color_space()))
 }
 
@@ -57,14 +57,14 @@ fn measure(
     Ok(scores)
 }
 
-/// The frames of a split as the training had it, else as the dataset has it.
+/// The frames of a split as the run had it, else as the dataset has it.
 fn frames(
     field: &TrainedField,
     dataset: &Dataset,
     split: Split,
     session: &Session<'_>,
 ) -> Result<Vec<usize>> {
-    let names = field.about().splits.names(split);
+    let names = field.metadata().splits.names(split);
     let (found, missing) = dataset.find(names);
     if found.is_empty() {
         let indices = dataset.split(split).to_vec();
@@ -73,8 +73,8 @@ fn frames(
             "there are no {} views, neither in the checkpoint nor in the dataset",
             split.name()
         );
-        session.remarks.warn(&format!(
-            "none of the {} {} views of the training is in this dataset; its own {} are measured",
+        session.console.warn(&format!(
+            "none of the {} {} views of the run is in this dataset; its own {} are measured",
             names.len(),
             split.name(),
             indices.len()
@@ -82,8 +82,8 @@ fn frames(
         return Ok(indices);
     }
     if !missing.is_empty() {
-        session.remarks.warn(&format!(
-            "{} of {} {} views of the training are missing in this dataset: {}",
+        session.console.warn(&format!(
+            "{} of {} {} views of the run are missing in this dataset: {}",
             missing.len(),
             names.len(),
             split.name(),
@@ -110,8 +110,8 @@ fn report(args: &Eval, field: &TrainedField, scores: &[Score], means: Means) -> 
         "background": args.background.name(),
         "split": args.split.name(),
         "encoding": "sRGB, clamped to 0..1",
-        "step": field.about().step,
-        "seconds": field.about().seconds,
+        "step": field.metadata().step,
+        "seconds": field.metadata().seconds,
         "views": scores,
     })
 }

@@ -5,7 +5,7 @@ use crate::cli::generate::Generate;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
 use nerf::support::format::count;
-use nerf::verify::scene::{self, Views};
+use nerf::verify::scene::{self, ViewCounts};
 use serde_json::json;
 
 pub(super) fn run(args: &Generate, session: &Session<'_>) -> Result<()> {
@@ -14,16 +14,16 @@ pub(super) fn run(args: &Generate, session: &Session<'_>) -> Result<()> {
     }
     let name = args.scene.as_deref().context("the name of a scene is needed; see --list")?;
     let out = args.out.as_deref().context("--out DIR is needed")?;
-    let options = scene::Generate {
-        views: Views::of_total(args.views).context("--views")?,
+    let options = scene::SceneOptions {
+        views: ViewCounts::of_total(args.views).context("--views")?,
         size: args.size,
         hdr: args.hdr,
         lenses: args.lens.clone(),
         samples: args.samples,
         seed: args.seed,
-        ..scene::Generate::new(name)
+        ..scene::SceneOptions::new(name)
     };
-    let progress = Progress::new(session.remarks, "generating");
+    let progress = Progress::new(session.console, "generating");
     let total = options.views.total();
     let summary = scene::generate(&options, out, &|done| progress.count(done, total, "views"))?;
     drop(progress);

@@ -1,18 +1,19 @@
-//! `nerf info`: what a training would make of a dataset, before it takes a night.
+//! `nerf info`: what training would make of a dataset, before it takes a night.
 
-mod page;
+mod json_report;
 mod problems;
-mod result;
+mod text_report;
 
 use super::{Failed, Session};
 use crate::cli::info::Info;
-use crate::flags::{spoken, told};
+use crate::flags::{message_with_flags, with_flags};
 use crate::progress::Progress;
 use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
+use nerf::capture::diagnostics::{Diagnostic, Severity};
+use nerf::capture::health::Survey;
+use nerf::capture::health::gallery::{Gallery, Look};
 use nerf::capture::health::map;
-use nerf::capture::health::photos::{Gallery, Look};
-use nerf::capture::health::{Finding, Severity, Survey};
 use nerf::photo::Reading;
 use nerf::run::Estimate;
 use nerf::support::file::write_atomically;
@@ -23,7 +24,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// All there is to say about a dataset.
 #[derive(Debug)]
-struct Report<'a> {
+struct Preflight<'a> {
     args: &'a Info,
     dataset: &'a Dataset,
     survey: Survey,
@@ -32,7 +33,7 @@ struct Report<'a> {
     /// `None` where there is nothing to train on.
     memory: Option<Estimate>,
     /// Worst first.
-    problems: Vec<Finding>,
+    problems: Vec<Diagnostic>,
 }
 
 pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
@@ -43,11 +44,11 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
     };
     let dataset = match Dataset::open(&args.dataset, &options) {
         Ok(dataset) => dataset,
-        Err(error) => return unreadable(args, &told(&error), session),
+        Err(error) => return unreadable(args, &with_flags(&error), session),
     };
     let mut report = inspect(args, &dataset, session)?;
     for problem in &mut report.problems {
-        problem.message = spoken(&problem.message, problem.remedy.as_ref());
+        problem.message = message_with_flags(&problem.message, problem.remedy.as_ref());
     }
     report.problems.sort_by_key(|problem| problem.severity);
     session.print(&report.json(), &report.text())?;
@@ -59,13 +60,13 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
         written.map_err(|error| Failed(format!("{error:#}")))?;
     }
     match report.problems.first().filter(|problem| problem.severity == Severity::Error) {
-        Some(problem) => Err(Failed(format!("a training would fail: {}", problem.message)).into()),
+        Some(problem) => Err(Failed(format!("training would fail: {}", problem.message)).into()),
         None => Ok(()),
     }
 }
 
 /// Looks at cameras, photos and memory.
-fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> Result<Report<'a>> {
+fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> Result<Preflight<'a>> {
     let survey = Survey::of(dataset);
     let mut problems = problems::of_dataset(dataset);
     problems.extend(survey.findings.iter().cloned());
@@ -87,18 +88,18 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
         problems.extend(problems::of_memory(&estimate));
         memory = Some(estimate);
     }
-    Ok(Report { args, dataset, survey, gallery, memory, problems })
+    Ok(Preflight { args, dataset, survey, gallery, memory, problems })
 }
 
 /// Decodes all photos, in parallel, and keeps what matters of each.
-fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, Vec<Finding>) {
-    let progress = Progress::new(session.remarks, "looking");
+fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, Vec<Diagnostic>) {
+    let progress = Progress::new(session.console, "looking");
     let done = AtomicUsize::new(0);
     let looks: Vec<_> = (views.par_iter())
         .map(|&index| {
             let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
             progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
-            look.map_err(|error| Finding::error(told(&error)).about(vec![index]))
+            look.map_err(|error| Diagnostic::error(with_flags(&error)).about(vec![index]))
         })
         .collect();
     let (looks, failures): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);

@@ -7,9 +7,9 @@ use anyhow::{Result, ensure};
 use nerf::camera::Bounds;
 use nerf::camera::{Camera, LensKind};
 use nerf::capture::dataset::read_cameras;
-use nerf::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
-use nerf::field::render::{Renderer, View};
-use nerf::photo::color::{ColorSpace, depth_srgb8, opaque_srgb8};
+use nerf::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use nerf::field::renderer::{Renderer, View};
+use nerf::photo::color_space::{ColorSpace, depth_srgb8, opaque_srgb8};
 use nerf::run::TrainedField;
 use nerf::support::file::write_atomically;
 use nerf::support::format::count;
@@ -45,12 +45,13 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(jobs.iter().map(|job| &job.camera));
     let mut renderer = field.renderer(&gpu, &lenses)?;
-    let depth_range = depth_range(&field.about().bounds, &jobs);
+    let depth_range = depth_range(&field.metadata().bounds, &jobs);
     let writer = Writer { args, color_space: field.color_space(), depth_range };
-    let progress = Progress::new(session.remarks, "rendering");
+    let progress = Progress::new(session.console, "rendering");
     let (frames, seconds) = render_and_write(&mut renderer, &jobs, &writer, &progress)?;
     drop(progress);
-    let mut listing = json!({ "checkpoint": field.path.display().to_string(), "step": field.about().step });
+    let mut listing =
+        json!({ "checkpoint": field.path.display().to_string(), "step": field.metadata().step });
     if args.depth {
         listing["depth_near"] = json!(depth_range[0]);
         listing["depth_far"] = json!(depth_range[1]);
@@ -65,7 +66,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     session.print(&result, &format!("{} in {out}", count(jobs.len(), "frame")))
 }
 
-/// Renders the jobs in order, describes their files, and tells the seconds that each took to render. A thread writes those
+/// Renders the jobs in order, describes their files, and returns the seconds that each took to render. A thread writes those
 /// of one view while the next one renders.
 fn render_and_write(
     renderer: &mut Renderer,
@@ -100,8 +101,8 @@ fn render_and_write(
 }
 
 fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
-    let about = field.about();
-    let [width, height] = about.image_size;
+    let metadata = field.metadata();
+    let [width, height] = metadata.image_size;
     let cameras: Vec<(String, Camera)> = match (&args.path.cameras, args.path.orbit) {
         (Some(file), _) => {
             let default_size = [args.width, args.height].into_iter().collect::<Option<Vec<_>>>();
@@ -109,7 +110,7 @@ fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
             read_cameras(file, default_size)?
         }
         (None, count) => {
-            let cameras = about.orbit.cameras(about.bounds.center, count.unwrap_or(1) as usize);
+            let cameras = metadata.orbit.cameras(metadata.bounds.center, count.unwrap_or(1) as usize);
             let named = cameras.into_iter().enumerate();
             named.map(|(index, camera)| (format!("orbit {index}"), camera)).collect()
         }

@@ -2,15 +2,16 @@
 
 use super::Session;
 use crate::cli::Train;
-use crate::flags::{spoken, told};
-use crate::outcome;
+use crate::flags::{message_with_flags, with_flags};
 use crate::progress::duration;
+use crate::score_summary;
 use anyhow::{Context, Result};
 use nerf::capture::dataset::{Dataset, OpenOptions};
-use nerf::capture::health::{Severity, Survey};
+use nerf::capture::diagnostics::Severity;
+use nerf::capture::health::Survey;
 use nerf::config::schedule::Budget;
-use nerf::field::checkpoint::{About, Checkpoint};
-use nerf::run::report::views::TestViews;
+use nerf::field::checkpoint::{Checkpoint, Metadata};
+use nerf::run::report::test_views::TestViews;
 use nerf::run::{
     EvaluationAtEnd, EvaluationOptions, NoTestViews, Resolved, RunFolder, TrainOptions, TrainingEnd,
     TrainingRun,
@@ -44,7 +45,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let end = training.train(&stop, &mut narrator)?;
     let views = training.evaluate(&end, &mut narrator)?.map_err(|reason| without_views(reason, args));
     drop(narrator);
-    let outcome = views.as_ref().ok().and_then(TestViews::outcome);
+    let summary = views.as_ref().ok().and_then(TestViews::summary);
     let report = training.write_report(&end, views);
     let folder = args.out.display().to_string();
     let mut result = json!({
@@ -55,18 +56,18 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         "skipped": end.skipped,
         "interrupted": end.interrupted,
     });
-    let mut text = summary(&end, training.about(), &folder);
-    if let Some(outcome) = outcome {
-        outcome::add(&mut result, Some(&outcome));
-        text = format!("{}; {text}", outcome::describe(&outcome));
-        if outcome.left_out > 0 {
+    let mut text = end_line(&end, training.metadata(), &folder);
+    if let Some(summary) = summary {
+        score_summary::add(&mut result, Some(&summary));
+        text = format!("{}; {text}", score_summary::describe(&summary));
+        if summary.left_out > 0 {
             text += &format!("; `nerf eval {folder} {}` measures all test views", args.dataset.display());
         }
-        session.remarks.fog(outcome.near_share);
+        session.console.fog(summary.near_share);
     }
     match report {
         Ok(page) => result["report"] = json!(page.display().to_string()),
-        Err(error) => session.remarks.warn(&format!("the training is saved, but {}", told(&error))),
+        Err(error) => session.console.warn(&format!("the run is saved, but {}", with_flags(&error))),
     }
     session.print(&result, &text)
 }
@@ -83,14 +84,14 @@ fn folder(args: &Train) -> Result<(RunFolder, Option<Checkpoint>)> {
 
 /// The dataset, read as the command line says, else as before; what looks wrong with it is said.
 fn open(args: &Train, checkpoint: Option<&Checkpoint>, session: &Session<'_>) -> Result<Dataset> {
-    let earlier = checkpoint.map(|checkpoint| checkpoint.about.reading.clone());
+    let earlier = checkpoint.map(|checkpoint| checkpoint.metadata.reading.clone());
     let reading = args.reading.over(earlier.unwrap_or_default());
     let options = OpenOptions { hold_out: args.hold_out, reading, ..OpenOptions::default() };
     let dataset = Dataset::open(&args.dataset, &options)?;
-    session.remarks.notes(&dataset);
+    session.console.notes(&dataset);
     let findings = Survey::of(&dataset).findings;
     for finding in findings.iter().filter(|finding| finding.severity < Severity::Note) {
-        session.remarks.warn(&spoken(&finding.message, finding.remedy.as_ref()));
+        session.console.warn(&message_with_flags(&finding.message, finding.remedy.as_ref()));
     }
     Ok(dataset)
 }
@@ -120,8 +121,8 @@ fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// How the training went, in one line; `about` describes its beginning.
-fn summary(end: &TrainingEnd, about: &About, folder: &str) -> String {
+/// How the run went, in one line; `metadata` describes its beginning.
+fn end_line(end: &TrainingEnd, metadata: &Metadata, folder: &str) -> String {
     let steps = count(end.step as usize, "step");
     let mut text = format!("{steps} in {}, saved to {folder}", duration(end.seconds));
     match end.skipped {
@@ -133,13 +134,13 @@ fn summary(end: &TrainingEnd, about: &About, folder: &str) -> String {
         }
     }
     if let Some([first, last]) =
-        end.loss.filter(|[first, last]| about.step == 0 && last != first && *last > 0.5 * first)
+        end.loss.filter(|[first, last]| metadata.step == 0 && last != first && *last > 0.5 * first)
     {
         text += &format!(
             "; the loss has {}, from {first:.4} to {last:.4}: give it more steps, or a smaller \
              optimizer.learning_rate than {}",
             if last > first { "risen" } else { "hardly fallen" },
-            about.config.optimizer.learning_rate
+            metadata.config.optimizer.learning_rate
         );
     }
     if end.interrupted {
@@ -152,9 +153,9 @@ fn summary(end: &TrainingEnd, about: &About, folder: &str) -> String {
 fn without_views(reason: NoTestViews, args: &Train) -> String {
     let later = format!("`nerf report {}` renders them.", args.out.display());
     match reason {
-        NoTestViews::NoneHeldOut => "The training held out no test views.".to_owned(),
+        NoTestViews::NoneHeldOut => "The run held out no test views.".to_owned(),
         NoTestViews::Interrupted => {
-            format!("The test views were not rendered, the training was interrupted; {later}")
+            format!("The test views were not rendered, the run was interrupted; {later}")
         }
         NoTestViews::NotAsked => {
             format!("The test views were not rendered, as asked for by --no-eval; {later}")

@@ -15,7 +15,7 @@ impl Config {
         let Self { grid, network, march, occupancy, batch, selection, loss, optimizer, .. } = self;
         if self.deterministic && matches!(self.accumulation, Accumulation::Float | Accumulation::Exchange) {
             bail!(
-                "a deterministic training must not add floats in any order: accumulation must be auto, ordered or \
+                "a deterministic run must not add floats in any order: accumulation must be auto, ordered or \
                  fixed; found {:?}",
                 self.accumulation
             );

@@ -1,11 +1,11 @@
-//! How long a training lasts, and the learning rate along the way.
+//! How long a training run lasts, and the learning rate along the way.
 
 use crate::config::Optimizer;
 use anyhow::{Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// The end of a training: a number of steps, of seconds, or whichever comes first.
+/// The end of a training run: a number of steps, of seconds, or whichever comes first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Budget {
@@ -23,7 +23,7 @@ impl Budget {
     pub fn validate(&self) -> Result<()> {
         ensure!(
             self.steps.is_some() || self.seconds.is_some(),
-            "a training needs a number of steps or seconds"
+            "a training run needs a number of steps or seconds"
         );
         ensure!(
             self.seconds.is_none_or(|seconds| seconds.is_finite() && seconds >= 0.0),
@@ -33,7 +33,7 @@ impl Budget {
         Ok(())
     }
 
-    /// The part of the training that is over after `step` steps and `seconds`, within `[0, 1]`.
+    /// The part of the run that is over after `step` steps and `seconds`, within `[0, 1]`.
     #[must_use]
     pub fn spent(&self, step: u32, seconds: f64) -> f64 {
         let part = |done: f64, all: f64| if all > 0.0 { (done / all).min(1.0) } else { 1.0 };
@@ -42,7 +42,7 @@ impl Budget {
         of_steps.max(of_seconds)
     }
 
-    /// Whether the training is over.
+    /// Whether the run is over.
     #[must_use]
     pub fn is_spent(&self, step: u32, seconds: f64) -> bool {
         self.spent(step, seconds) >= 1.0

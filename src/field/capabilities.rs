@@ -2,7 +2,7 @@
 
 use crate::config::Accumulation;
 use crate::gpu::Gpu;
-use crate::gpu::tensor::Memory;
+use crate::gpu::tensor::TensorMemory;
 use anyhow::{Result, ensure};
 
 /// What a plan depends on of an adapter.
@@ -15,13 +15,13 @@ pub struct Capabilities {
     /// It has subgroups of a multiple of 8 threads.
     pub subgroups_of_8: bool,
     /// Where its tensors are fast.
-    pub memory: Memory,
+    pub memory: TensorMemory,
 }
 
 impl Capabilities {
     /// A usual GPU.
     pub const GPU: Self =
-        Self { is_cpu: false, float_atomics: true, subgroups_of_8: true, memory: Memory::Buffers };
+        Self { is_cpu: false, float_atomics: true, subgroups_of_8: true, memory: TensorMemory::Buffers };
 
     /// Those of an adapter.
     #[must_use]

@@ -15,7 +15,7 @@ pub struct Capacity {
 }
 
 impl Capacity {
-    /// That of a training's steps. Half as many kept samples again as are aimed at, since the number of rays follows it
+    /// That of training steps. Half as many kept samples again as are aimed at, since the number of rays follows it
     /// only from step to step.
     #[must_use]
     pub fn of_steps(batch: &Batch) -> Self {
@@ -62,7 +62,7 @@ impl Rounds {
 
     /// The weight of a colour. Without a bound on the colours there is none on the error of one that stands for
     /// others: in linear light every sample has its own.
-    pub(crate) fn color_weight(&self, needs: &SceneFeatures) -> f64 {
-        if needs.hdr { LEAST_WEIGHT } else { self.color_weight }
+    pub(crate) fn color_weight(&self, features: &SceneFeatures) -> f64 {
+        if features.hdr { LEAST_WEIGHT } else { self.color_weight }
     }
 }

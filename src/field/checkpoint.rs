@@ -2,7 +2,7 @@
 //!
 //! One safetensors file. Tensors: the parameters and Adam's moments (`table`: `[entries, 2]`,
 //! `table_moments`: `[entries, 4]`, `mlp*`: `[quads, 4]`), `occupancy` (`[cascades, cells, cells, cells]`) and
-//! `occupancy_bits`. The metadata entry [`KEY`] holds [`About`] as JSON.
+//! `occupancy_bits`. The metadata entry [`KEY`] holds [`Metadata`] as JSON.
 
 use crate::camera::Bounds;
 use crate::camera::orbit::Orbit;
@@ -27,22 +27,22 @@ use std::sync::Arc;
 pub const FORMAT: u64 = 2;
 /// The key of the metadata entry.
 pub const KEY: &str = "nerf";
-/// The file's name in the folder of a training.
+/// The file's name in the folder of a training run.
 pub const FILE: &str = "checkpoint.safetensors";
 
 /// A trained field and where its training stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
-    /// What it is.
-    pub about: About,
+    /// Where it comes from and how it is to be linked.
+    pub metadata: Metadata,
     /// Parameters, moments and occupancy.
     pub state: State,
 }
 
-/// What a checkpoint says about itself.
+/// The metadata of a checkpoint: its configuration, progress, dataset and scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct About {
+pub struct Metadata {
     /// Always [`FORMAT`].
     pub format: u64,
     /// The dataset as it was named.
@@ -56,20 +56,21 @@ pub struct About {
     /// By how much the steps along its rays are longer than the configuration's, as a share of them.
     #[serde(default)]
     pub step_excess: f32,
-    /// Seconds of training; 0 of a deterministic one.
+    /// Seconds of training; 0 of a deterministic run.
     pub seconds: f64,
-    /// When the training is to end.
+    /// When the run is to end.
     pub budget: Budget,
     /// The resolved configuration; `grid.finest` is never 0.
     pub config: Arc<Config>,
     /// The scene's box in world space.
     pub bounds: Bounds,
-    /// What the kernels were linked with.
-    pub needs: SceneFeatures,
+    /// The scene's features, which the kernels were linked for.
+    #[serde(rename = "needs")]
+    pub features: SceneFeatures,
     /// How the photos were read.
     pub reading: Reading,
     /// Which frames were trained on, and which were not.
-    pub splits: Splits,
+    pub splits: SplitNames,
     /// Median width and height of the training images, in pixels.
     pub image_size: [u32; 2],
     /// Whether the training images have transparent pixels.
@@ -81,7 +82,7 @@ pub struct About {
 /// Names of the frames of each split.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Splits {
+pub struct SplitNames {
     /// Trained on.
     pub train: Vec<String>,
     /// Set aside to choose settings by.
@@ -90,7 +91,7 @@ pub struct Splits {
     pub test: Vec<String>,
 }
 
-impl Splits {
+impl SplitNames {
     /// The names of one split.
     #[must_use]
     pub fn names(&self, split: Split) -> &[String] {
@@ -102,15 +103,15 @@ impl Splits {
     }
 }
 
-/// Settings that earlier trainings had, which rendering does not need and training no longer knows.
+/// Settings of earlier versions, which rendering does not need and training no longer knows.
 const RETIRED: [(&str, &str); 3] =
     [("selection", "keep_probability"), ("occupancy", "warm_up"), ("occupancy", "stride")];
 
-impl About {
+impl Metadata {
     /// How kernels are linked for an adapter.
     #[must_use]
     pub fn plan(&self, adapter: Capabilities) -> Plan {
-        Plan::suited_to(adapter, Arc::clone(&self.config), self.needs.clone(), Space::from(&self.bounds))
+        Plan::suited_to(adapter, Arc::clone(&self.config), self.features.clone(), Space::from(&self.bounds))
     }
 
     /// The arrays of the state, which are the same on every adapter.
@@ -136,13 +137,13 @@ impl About {
                 settings.remove(key);
             }
         }
-        let about: Self = serde_json::from_value(value).context("its description is not understood")?;
-        about.config.validate().context("its configuration")?;
-        ensure!(about.config.grid.finest > 0, "its configuration leaves grid.finest open");
-        let cascades = about.bounds.cascades;
+        let metadata: Self = serde_json::from_value(value).context("its description is not understood")?;
+        metadata.config.validate().context("its configuration")?;
+        ensure!(metadata.config.grid.finest > 0, "its configuration leaves grid.finest open");
+        let cascades = metadata.bounds.cascades;
         ensure!((1..=8).contains(&cascades), "expected 1 to 8 cascades, found {cascades}");
-        ensure!(about.bounds.half.is_finite() && about.bounds.half > 0.0, "its scene box is empty");
-        Ok(about)
+        ensure!(metadata.bounds.half.is_finite() && metadata.bounds.half > 0.0, "its scene box is empty");
+        Ok(metadata)
     }
 }
 
@@ -153,7 +154,7 @@ impl Checkpoint {
     /// When a number is not finite, or the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let mut tensors = Vec::new();
-        for (array, (name, numbers)) in self.about.arrays().zip(&self.state.arrays) {
+        for (array, (name, numbers)) in self.metadata.arrays().zip(&self.state.arrays) {
             let (found, expected) = (numbers.count(), array.count());
             ensure!(
                 *name == array.name && found == expected,
@@ -167,9 +168,8 @@ impl Checkpoint {
             };
             tensors.push((*name, TensorView::new(dtype, array.shape, bytes)?));
         }
-        let about = serde_json::to_string(&self.about)?;
-        let metadata = HashMap::from([(KEY.to_owned(), about)]);
-        let bytes = safetensors::serialize(tensors, Some(metadata))?;
+        let entries = HashMap::from([(KEY.to_owned(), serde_json::to_string(&self.metadata)?)]);
+        let bytes = safetensors::serialize(tensors, Some(entries))?;
         write_atomically(path, |file| Ok(file.write_all(&bytes)?))
     }
 
@@ -184,10 +184,10 @@ impl Checkpoint {
     }
 
     fn parse(bytes: &[u8]) -> Result<Self> {
-        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|error| explain(&error, bytes))?;
-        let about = metadata.metadata().as_ref().and_then(|entries| entries.get(KEY));
-        let about = about.context("it is a safetensors file, but `nerf train` did not write it")?;
-        let about = About::parse(about)?;
+        let (_, header) = SafeTensors::read_metadata(bytes).map_err(|error| explain(&error, bytes))?;
+        let entry = header.metadata().as_ref().and_then(|entries| entries.get(KEY));
+        let entry = entry.context("it is a safetensors file, but `nerf train` did not write it")?;
+        let metadata = Metadata::parse(entry)?;
         let tensors = SafeTensors::deserialize(bytes)?;
         let numbers = |array: Array| {
             let Array { name, shape, .. } = &array;
@@ -206,13 +206,14 @@ impl Checkpoint {
             check_finite(name, numbers.floats())?;
             Ok((array.name, numbers))
         };
-        let arrays = about.arrays().map(numbers).collect::<Result<_>>()?;
-        let state = State { step: about.step, rays: about.rays, step_excess: about.step_excess, arrays };
-        Ok(Self { about, state })
+        let arrays = metadata.arrays().map(numbers).collect::<Result<_>>()?;
+        let state =
+            State { step: metadata.step, rays: metadata.rays, step_excess: metadata.step_excess, arrays };
+        Ok(Self { metadata, state })
     }
 }
 
-/// The checkpoint that a folder of a training, or a path to the file itself, stands for.
+/// The checkpoint that a folder of a training run, or a path to the file itself, stands for.
 ///
 /// # Errors
 /// When there is none; the message says where it was looked for.
@@ -249,7 +250,7 @@ fn check_finite(name: &str, values: &[f32]) -> Result<()> {
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
         Some(index) => bail!(
-            "the tensor '{name}' has a value that is not finite ({} at {index}): the training diverged; \
+            "the tensor '{name}' has a value that is not finite ({} at {index}): training diverged; \
              start again with a smaller optimizer.learning_rate",
             values[index]
         ),
@@ -266,8 +267,8 @@ mod tests {
         let small = r#"{"grid": {"levels": 8, "finest": 40, "log2_table": 8}, "occupancy": {"cells": 16}}"#;
         config.merge(&serde_json::from_str(small).expect("JSON")).expect("valid");
         let bounds = Bounds { center: DVec3::new(0.1, 0.2, 0.3), half: 1.5, cascades: 1, source: "x".into() };
-        let needs = SceneFeatures { alpha: true, ..SceneFeatures::default() };
-        let about = About {
+        let features = SceneFeatures { alpha: true, ..SceneFeatures::default() };
+        let metadata = Metadata {
             format: FORMAT,
             dataset: "data/toys".into(),
             adapter: "a test".into(),
@@ -278,9 +279,9 @@ mod tests {
             budget: Budget { steps: Some(100), seconds: None },
             config: config.into(),
             bounds,
-            needs,
+            features,
             reading: Reading { downscale: 2, ..Reading::default() },
-            splits: Splits { train: vec!["a".into()], ..Splits::default() },
+            splits: SplitNames { train: vec!["a".into()], ..SplitNames::default() },
             image_size: [30, 20],
             has_alpha: true,
             orbit: Orbit::of(&[], DVec3::ZERO),
@@ -290,9 +291,13 @@ mod tests {
             let words = array.has_words().then(|| Numbers::Words(vec![0xdead_beef; array.count()]));
             (array.name, words.unwrap_or(Numbers::Floats(floats)))
         };
-        let state =
-            State { step: 12, rays: 345, step_excess: 0.25, arrays: about.arrays().map(numbers).collect() };
-        Checkpoint { about, state }
+        let state = State {
+            step: 12,
+            rays: 345,
+            step_excess: 0.25,
+            arrays: metadata.arrays().map(numbers).collect(),
+        };
+        Checkpoint { metadata, state }
     }
 
     fn saved() -> (tempfile::TempDir, PathBuf) {
@@ -330,24 +335,25 @@ mod tests {
     }
 
     #[test]
-    fn settings_of_earlier_trainings_are_left_out() {
-        let about = checkpoint().about;
-        let mut value = serde_json::to_value(&about).expect("JSON");
+    fn settings_of_earlier_versions_are_left_out() {
+        let metadata = checkpoint().metadata;
+        let mut value = serde_json::to_value(&metadata).expect("JSON");
+        assert!(value["needs"].is_object(), "the key of the scene's features in every file so far");
         for (group, key) in RETIRED {
             value["config"][group][key] = 0.5.into();
         }
-        assert_eq!(About::parse(&value.to_string()).expect("known"), about);
+        assert_eq!(Metadata::parse(&value.to_string()).expect("known"), metadata);
         value["config"]["occupancy"]["unheard_of"] = 1.into();
-        assert!(About::parse(&value.to_string()).is_err());
+        assert!(Metadata::parse(&value.to_string()).is_err());
     }
 
     #[test]
     fn another_version_or_size_is_refused() {
         let (_folder, path) = saved();
-        let text = |about: &About| serde_json::to_string(about).expect("JSON");
-        let about = checkpoint().about;
-        let newer = About { format: FORMAT + 1, ..about.clone() };
-        assert!(format!("{:#}", About::parse(&text(&newer)).expect_err("newer")).contains("found 3"));
+        let text = |metadata: &Metadata| serde_json::to_string(metadata).expect("JSON");
+        let metadata = checkpoint().metadata;
+        let newer = Metadata { format: FORMAT + 1, ..metadata.clone() };
+        assert!(format!("{:#}", Metadata::parse(&text(&newer)).expect_err("newer")).contains("found 3"));
         let bytes = std::fs::read(&path).expect("readable");
         let (from, to) = (r#"\"log2_table\":8"#, r#"\"log2_table\":9"#);
         let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect("there");

@@ -103,7 +103,7 @@ impl Plan {
             ("WEIGHT_FLOOR", self.weight_floor()),
             ("LIGHT_SHARE", config.selection.light_share.max(1e-6)),
             ("STOP_TRANSMITTANCE", config.selection.stop_transmittance),
-            ("COLOR_WEIGHT", self.rounds.color_weight(&self.needs)),
+            ("COLOR_WEIGHT", self.rounds.color_weight(&self.features)),
             ("OCCUPANCY_DECAY", config.occupancy.decay),
             ("OCCUPANCY_THRESHOLD", config.occupancy.threshold),
             ("BETA_1", config.optimizer.beta_1),
@@ -118,7 +118,7 @@ impl Plan {
             ("SPARSE_DENSITY", SPARSE_DENSITY),
         ];
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
-        let background = config.background.solid().map(|value| value / self.needs.grey);
+        let background = config.background.solid().map(|value| value / self.features.grey);
         source.constant("BACKGROUND", vec3(background))
     }
 

@@ -1,10 +1,10 @@
-//! What a scene needs of the kernels: everything else is not linked.
+//! The features of a scene that kernels are linked for: everything else is left out.
 
 use crate::camera::LensKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// What a scene needs, apart from the configuration.
+/// What a scene has, apart from the configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneFeatures {
     /// The lenses that cameras have; at least one.

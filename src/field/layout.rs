@@ -106,14 +106,14 @@ impl Layout {
     /// Table entries drawn uniformly from ±1e-4, as Müller et al. do.
     #[must_use]
     pub fn initial_table(&self, seed: u32) -> Vec<f32> {
-        let mut random = Random::new(seed, 1);
+        let mut random = InitialNumbers::new(seed, 1);
         (0..self.entries * FEATURES).map(|_| (random.uniform() * 2.0 - 1.0) * 1e-4).collect()
     }
 
     /// Weights drawn uniformly as Glorot & Bengio (2010) do; unused outputs are 0 and stay so.
     #[must_use]
     pub fn initial_weights(&self, seed: u32) -> Vec<f32> {
-        let mut random = Random::new(seed, 2);
+        let mut random = InitialNumbers::new(seed, 2);
         let mut weights = vec![0.0; self.quads * 4];
         let last = self.color.len() - 1;
         for (number, layer) in self.density.iter().chain(&self.color).enumerate() {
@@ -176,12 +176,12 @@ pub fn pcg(value: u32) -> u32 {
 }
 
 /// A sequence of random numbers for the initial parameters.
-struct Random {
+struct InitialNumbers {
     stream: u32,
     index: u32,
 }
 
-impl Random {
+impl InitialNumbers {
     fn new(seed: u32, stream: u32) -> Self {
         Self { stream: pcg(stream.wrapping_add(pcg(seed))), index: 0 }
     }

@@ -150,7 +150,7 @@ impl Linker<'_> {
             return self.add(name, text);
         }
         if name == LENS {
-            let lenses = &self.plan.needs.lenses;
+            let lenses = &self.plan.features.lenses;
             for &kind in lenses {
                 self.add_file(LENS, &lenses::file(kind))?;
             }
@@ -213,7 +213,7 @@ impl Plan {
     /// What is not linked for this scene and these settings, each with the reason.
     #[must_use]
     pub fn left_out(&self) -> Vec<String> {
-        let absent: Vec<_> = lenses::absent(&self.needs.lenses).collect();
+        let absent: Vec<_> = lenses::absent(&self.features.lenses).collect();
         let lenses =
             (!absent.is_empty()).then(|| format!("lens models {} (no camera has them)", absent.join("/")));
         let variants = SLOTS.iter().flat_map(|slot| {

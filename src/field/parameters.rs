@@ -1,20 +1,20 @@
-//! The parameter groups of a field: one table, from which buffers, the state of a training, checkpoints, memory and Adam
+//! The parameter groups of a field: one table, from which buffers, the state of a training run, checkpoints, memory and Adam
 //! follow. One group more is one row here, and its kernels.
 
 use super::Plan;
 use super::layout::{FEATURES, Layout};
 use crate::config::Optimizer;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::tensor::Element;
 
 /// A group of parameters.
-pub struct Group {
+pub struct ParameterGroup {
     /// What kernels and checkpoints call it.
     pub name: &'static str,
-    place: Place,
+    place: ArrayStorage,
     /// The shape of its numbers.
     shape: fn(&Plan) -> Vec<usize>,
-    start: Start,
+    start: InitialValue,
     /// Whether rendering reads it.
     rendered: bool,
     /// How Adam learns it; `None` for what is measured instead.
@@ -28,9 +28,9 @@ pub struct Learning {
     /// Its L2 regularisation.
     pub l2: fn(&Optimizer) -> f64,
     /// The numbers that Adam keeps of it: what they are called, where they are, and how many there are per parameter.
-    moments: &'static [(&'static str, Place, usize)],
+    moments: &'static [(&'static str, ArrayStorage, usize)],
     /// Its kernel.
-    pub kernel: Kernel,
+    pub kernel: AdamKernel,
 }
 
 impl Learning {
@@ -45,7 +45,7 @@ impl Learning {
 
 /// A kernel of Adam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kernel {
+pub enum AdamKernel {
     /// `adam_table.wgsl`: leaves alone what no gradient touched.
     Table,
     /// `adam_dense.wgsl`: all, from the gradients in the buffer of this name, with two arrays of moments.
@@ -54,7 +54,7 @@ pub enum Kernel {
 
 /// Where the numbers of an array are on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Place {
+enum ArrayStorage {
     /// In a tensor.
     Tensor(Element),
     /// In a buffer that kernels read as uniform.
@@ -65,7 +65,7 @@ enum Place {
 
 /// What an array holds before the first step.
 #[derive(Clone, Copy)]
-enum Start {
+enum InitialValue {
     /// Zeros.
     Zeros,
     /// Numbers drawn from a seed.
@@ -75,47 +75,47 @@ enum Start {
 }
 
 /// The table.
-pub static GROUPS: &[Group] = &[
-    Group {
+pub static GROUPS: &[ParameterGroup] = &[
+    ParameterGroup {
         name: "table",
-        place: Place::Tensor(Element::Vec2),
+        place: ArrayStorage::Tensor(Element::Vec2),
         shape: |plan| vec![plan.layout.entries, FEATURES],
-        start: Start::Drawn(Layout::initial_table),
+        start: InitialValue::Drawn(Layout::initial_table),
         rendered: true,
         learning: Some(Learning {
             rate: 1.0,
             l2: |_| 0.0,
             // The first of both features, then the second.
-            moments: &[("table_moments", Place::Tensor(Element::Vec4), 2)],
-            kernel: Kernel::Table,
+            moments: &[("table_moments", ArrayStorage::Tensor(Element::Vec4), 2)],
+            kernel: AdamKernel::Table,
         }),
     },
-    Group {
+    ParameterGroup {
         name: "mlp",
-        place: Place::Uniform,
+        place: ArrayStorage::Uniform,
         shape: |plan| vec![plan.layout.quads, 4],
-        start: Start::Drawn(Layout::initial_weights),
+        start: InitialValue::Drawn(Layout::initial_weights),
         rendered: true,
         learning: Some(Learning {
             rate: 1.0,
             l2: |optimizer| optimizer.l2,
-            moments: &[("mlp_first", Place::Storage, 1), ("mlp_second", Place::Storage, 1)],
-            kernel: Kernel::Dense("d_weights"),
+            moments: &[("mlp_first", ArrayStorage::Storage, 1), ("mlp_second", ArrayStorage::Storage, 1)],
+            kernel: AdamKernel::Dense("d_weights"),
         }),
     },
-    Group {
+    ParameterGroup {
         name: "occupancy",
-        place: Place::Storage,
+        place: ArrayStorage::Storage,
         shape: |plan| plan.space.grid_shape(plan.config.occupancy.cells).to_vec(),
-        start: Start::Cells(occupancy),
+        start: InitialValue::Cells(occupancy),
         rendered: false,
         learning: None,
     },
-    Group {
+    ParameterGroup {
         name: "occupancy_bits",
-        place: Place::Tensor(Element::Word),
+        place: ArrayStorage::Tensor(Element::U32),
         shape: |plan| vec![plan.cell_count() / 32],
-        start: Start::Cells(occupancy_bits),
+        start: InitialValue::Cells(occupancy_bits),
         rendered: true,
         learning: None,
     },
@@ -162,7 +162,7 @@ impl Numbers {
     }
 }
 
-/// An array that the state of a training has: the parameters of a group, or what Adam keeps of them.
+/// An array that the state of a training run has: the parameters of a group, or what Adam keeps of them.
 #[derive(Clone)]
 pub struct Array {
     /// What kernels and checkpoints call it.
@@ -171,8 +171,8 @@ pub struct Array {
     pub shape: Vec<usize>,
     /// Whether rendering reads it.
     pub rendered: bool,
-    place: Place,
-    start: Start,
+    place: ArrayStorage,
+    start: InitialValue,
 }
 
 impl Array {
@@ -185,42 +185,44 @@ impl Array {
     /// Whether its numbers are words.
     #[must_use]
     pub fn has_words(&self) -> bool {
-        self.place == Place::Tensor(Element::Word)
+        self.place == ArrayStorage::Tensor(Element::U32)
     }
 
-    /// What it holds before the first step of a training where nothing can be in the `hidden` cells.
+    /// What it holds before the first step of a training run where nothing can be in the `hidden` cells.
     #[must_use]
     pub fn start(&self, plan: &Plan, hidden: &[bool]) -> Numbers {
         match self.start {
-            Start::Zeros => Numbers::Floats(vec![0.0; self.count()]),
-            Start::Drawn(draw) => Numbers::Floats(draw(&plan.layout, plan.config.seed)),
-            Start::Cells(from) => from(plan, hidden),
+            InitialValue::Zeros => Numbers::Floats(vec![0.0; self.count()]),
+            InitialValue::Drawn(draw) => Numbers::Floats(draw(&plan.layout, plan.config.seed)),
+            InitialValue::Cells(from) => from(plan, hidden),
         }
     }
 
     /// Its room on the device.
     #[must_use]
-    pub fn demand(&self, plan: &Plan) -> Demand {
+    pub fn spec(&self, plan: &Plan) -> BufferSpec {
         match self.place {
-            Place::Tensor(element) => plan.tensor(self.name, element, self.count() * 4 / element.bytes()),
-            Place::Uniform => Demand::uniform_storage::<u32>(self.name, self.count()),
-            Place::Storage => Demand::storage::<u32>(self.name, self.count()),
+            ArrayStorage::Tensor(element) => {
+                plan.tensor(self.name, element, self.count() * 4 / element.bytes())
+            }
+            ArrayStorage::Uniform => BufferSpec::uniform_storage::<u32>(self.name, self.count()),
+            ArrayStorage::Storage => BufferSpec::storage::<u32>(self.name, self.count()),
         }
     }
 }
 
 impl Plan {
-    /// The arrays of the state of a training, group by group. A group without numbers has none.
+    /// The arrays of the state of a training run, group by group. A group without numbers has none.
     pub fn arrays(&self) -> impl Iterator<Item = Array> {
         GROUPS.iter().flat_map(|group| {
             let shape = (group.shape)(self);
-            let Group { name, place, start, rendered, .. } = *group;
+            let ParameterGroup { name, place, start, rendered, .. } = *group;
             let own = Array { name, shape: shape.clone(), rendered, place, start };
             let moments = group.learning.iter().flat_map(|learning| learning.moments);
             let moments = moments.map(move |&(name, place, per_parameter)| {
                 let mut shape = shape.clone();
                 shape.iter_mut().last().into_iter().for_each(|inner| *inner *= per_parameter);
-                Array { name, shape, rendered: false, place, start: Start::Zeros }
+                Array { name, shape, rendered: false, place, start: InitialValue::Zeros }
             });
             [own].into_iter().chain(moments).filter(|array| array.count() > 0)
         })
@@ -267,7 +269,7 @@ mod tests {
             let start = array.start(&plan, &hidden);
             assert_eq!(start.count(), array.count(), "{}", array.name);
             assert_eq!(array.has_words(), matches!(start, Numbers::Words(_)));
-            assert_eq!(array.demand(&plan).bytes(), 4 * array.count() as u64);
+            assert_eq!(array.spec(&plan).bytes(), 4 * array.count() as u64);
         }
         assert_eq!(occupancy(&plan, &hidden).floats()[33], -1.0);
         assert_eq!(occupancy_bits(&plan, &hidden), Numbers::Words([&[!0, !2][..], &vec![!0; 254]].concat()));

@@ -6,7 +6,7 @@ use super::{Capabilities, Capacity, SceneFeatures, Space, layer};
 use crate::camera::LensKind;
 use crate::config::{Accumulation, ColorLoss, Config};
 use crate::gpu::Gpu;
-use crate::gpu::tensor::Memory;
+use crate::gpu::tensor::TensorMemory;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -21,8 +21,8 @@ pub struct Plan {
     pub config: Arc<Config>,
     /// The parameters' layout.
     pub layout: Layout,
-    /// What the scene needs.
-    pub needs: SceneFeatures,
+    /// The scene's features, which kernels are linked for.
+    pub features: SceneFeatures,
     /// Where the scene is.
     pub space: Space,
     /// What there is room for.
@@ -32,7 +32,7 @@ pub struct Plan {
     /// How the table's gradients are summed.
     pub accumulation: Accumulation,
     /// Where tensors live.
-    pub memory: Memory,
+    pub memory: TensorMemory,
     /// Chunks of samples whose weight gradients are summed apart: what runs side by side.
     pub chunks: usize,
     /// How much of a view is in work at once.
@@ -42,8 +42,8 @@ pub struct Plan {
 impl Plan {
     /// Chooses what depends on the adapter; `grid.finest` is never 0.
     #[must_use]
-    pub fn new(gpu: &Gpu, config: impl Into<Arc<Config>>, needs: SceneFeatures, space: Space) -> Self {
-        Self::suited_to(Capabilities::of(gpu), config, needs, space)
+    pub fn new(gpu: &Gpu, config: impl Into<Arc<Config>>, features: SceneFeatures, space: Space) -> Self {
+        Self::suited_to(Capabilities::of(gpu), config, features, space)
     }
 
     /// As [`Plan::new`], for an adapter that need not be there.
@@ -51,7 +51,7 @@ impl Plan {
     pub fn suited_to(
         adapter: Capabilities,
         config: impl Into<Arc<Config>>,
-        needs: SceneFeatures,
+        features: SceneFeatures,
         space: Space,
     ) -> Self {
         let config = config.into();
@@ -76,14 +76,14 @@ impl Plan {
         let product = layer::Product { rows, shared_weights };
         let rounds = Rounds::suited_to(adapter);
         let memory = adapter.memory;
-        Self { config, layout, needs, space, capacity, product, accumulation, memory, chunks, rounds }
+        Self { config, layout, features, space, capacity, product, accumulation, memory, chunks, rounds }
     }
 
-    /// The plan of a renderer of the same field for cameras with `lenses`, whose room does not depend on the training's.
+    /// The plan of a renderer of the same field for cameras with `lenses`, whose room does not depend on the run's.
     #[must_use]
     pub fn for_views(&self, lenses: &BTreeSet<LensKind>) -> Self {
-        let needs = SceneFeatures { lenses: lenses.clone(), ..self.needs.clone() };
-        Self { needs, capacity: Capacity::of_rounds(&self.rounds), ..self.clone() }
+        let features = SceneFeatures { lenses: lenses.clone(), ..self.features.clone() };
+        Self { features, capacity: Capacity::of_rounds(&self.rounds), ..self.clone() }
     }
 
     /// The least and the largest step of a ray, in box units.
@@ -92,7 +92,7 @@ impl Plan {
         self.space.step_range(&self.config.march, self.config.occupancy.cells)
     }
 
-    /// The least step in sides of the inner cube: what an optical depth of the occupancy grid is told over.
+    /// The least step in sides of the inner cube: the length that an optical depth of the occupancy grid is taken over.
     #[must_use]
     pub fn least_step(&self) -> f64 {
         self.step_range()[0] * self.space.cubes_per_box()
@@ -119,14 +119,14 @@ impl Plan {
     /// Whether the loss has use for distances along rays.
     #[must_use]
     pub fn needs_distances(&self) -> bool {
-        self.needs.depth || self.config.loss.distortion > 0.0
+        self.features.depth || self.config.loss.distortion > 0.0
     }
 
     /// Whether colour errors count relative to the colour.
     #[must_use]
     pub fn has_relative_loss(&self) -> bool {
         match self.config.loss.color {
-            ColorLoss::Auto => self.needs.hdr,
+            ColorLoss::Auto => self.features.hdr,
             chosen => chosen == ColorLoss::Relative,
         }
     }

@@ -4,7 +4,7 @@
 //! then its depth where depth is trained on. Ignored pixels have no record, so they are never drawn.
 
 use super::Plan;
-use crate::gpu::banks::{self, rows_of};
+use crate::gpu::paged_array::{self, rows_of};
 use crate::photo::{BitDepth, Photo, Pixels};
 use anyhow::{Result, ensure};
 use std::borrow::Cow;
@@ -53,7 +53,7 @@ impl Record {
         self.color + usize::from(self.has_position)
     }
 
-    /// Rows of the banks that a photo of `pixels` pixels takes at most.
+    /// Rows of the pages that a photo of `pixels` pixels takes at most.
     #[must_use]
     pub fn rows(&self, pixels: usize) -> usize {
         rows_of(pixels * self.words())
@@ -87,7 +87,7 @@ impl Record {
         Ok(Cow::Owned(words))
     }
 
-    /// Whether a record holds all that the photo tells. Without positions a pixel's record is found by its number, so
+    /// Whether a record holds all channels of the photo. Without positions a pixel's record is found by its number, so
     /// that one left out would move all behind it; without alpha what is transparent would be trained on as it is stored.
     fn check(&self, photo: &Photo) -> Result<()> {
         let Photo { image, ignored, depth } = photo;
@@ -144,7 +144,7 @@ impl Record {
     }
 }
 
-/// What to do about a photo that the features do not tell of.
+/// What to do about a photo that the plan's features do not cover.
 const TAKE_FEATURES: &str =
     "take the features of the photos themselves (SceneFeatures::of), or start again if a file has changed";
 
@@ -166,20 +166,20 @@ impl Plan {
     /// What the device keeps of a pixel.
     #[must_use]
     pub fn record(&self) -> Record {
-        let needs = &self.needs;
-        let color = match (needs.hdr, needs.deep) {
+        let features = &self.features;
+        let color = match (features.hdr, features.deep) {
             (true, _) => 4,
             (false, true) => 2,
             (false, false) => 1,
         };
-        let is_opaque = color == 1 && !needs.alpha;
-        Record { color, is_opaque, has_position: needs.masks, has_depth: needs.depth }
+        let is_opaque = color == 1 && !features.alpha;
+        Record { color, is_opaque, has_position: features.masks, has_depth: features.depth }
     }
 
     /// Bytes of all photos of these numbers of pixels.
     #[must_use]
     pub fn photo_bytes(&self, pixels: impl Iterator<Item = usize>) -> u64 {
-        banks::bytes_of(pixels.map(|pixels| self.record().rows(pixels)).sum())
+        paged_array::bytes_of(pixels.map(|pixels| self.record().rows(pixels)).sum())
     }
 }
 

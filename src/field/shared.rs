@@ -5,17 +5,17 @@ use super::lenses;
 use crate::camera::Geometry;
 use crate::config::Optimizer;
 use crate::field::layout::Level;
-use crate::gpu::kernel::{Layout, Shared};
+use crate::gpu::kernel::{Shared, StructLayout};
 use crate::gpu_struct;
 
 /// Every struct that kernels and the host share.
-pub const LAYOUTS: &[Layout] = &[
+pub const LAYOUTS: &[StructLayout] = &[
     Step::LAYOUT,
     Counters::LAYOUT,
     Progress::LAYOUT,
     RayTarget::LAYOUT,
     RayResult::LAYOUT,
-    Camera::LAYOUT,
+    DeviceCamera::LAYOUT,
     Level::LAYOUT,
     Tile::LAYOUT,
 ];
@@ -146,7 +146,7 @@ gpu_struct! {
 
 gpu_struct! {
     /// A camera in box space; see `shaders/common/camera.wgsl`.
-    Camera {
+    DeviceCamera as Camera {
         /// Position.
         origin: [f32; 3],
         /// Pixels per row.
@@ -157,7 +157,7 @@ gpu_struct! {
         height: u32,
         /// +Y axis.
         up: [f32; 3],
-        /// The photo's first row in the banks.
+        /// The photo's first row in the pages.
         first_row: u32,
         /// +Z axis, away from the view.
         back: [f32; 3],
@@ -178,7 +178,7 @@ gpu_struct! {
     }
 }
 
-impl Camera {
+impl DeviceCamera {
     /// `camera` in box space, without a photo.
     #[must_use]
     pub fn in_box(camera: &crate::camera::Camera, space: &Space) -> Self {

@@ -2,7 +2,7 @@
 //!
 //! *World* space is the dataset's own. *Box* space is what the kernels march through: the scene's box is its unit cube.
 //! The hash grid covers the unit cube of *grid* space, which is box space where space is not bent. Densities and
-//! distances along rays are told in sides of the inner cube.
+//! distances along rays are in sides of the inner cube.
 
 use crate::camera::Bounds;
 use crate::config::March;

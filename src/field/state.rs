@@ -1,8 +1,8 @@
-//! Where a training stands.
+//! Where a training run stands.
 
 use super::parameters::Numbers;
 
-/// Everything that a training needs to go on as if it had never stopped.
+/// Everything that a training run needs to go on as if it had never stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// Steps taken.

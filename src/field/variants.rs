@@ -41,7 +41,7 @@ const fn slot(name: &'static str, chosen_by: &'static str, variants: &'static [V
 }
 
 fn has_depth(plan: &Plan) -> bool {
-    plan.needs.depth
+    plan.features.depth
 }
 
 pub(super) static SLOTS: &[Slot] = &[
@@ -59,15 +59,15 @@ pub(super) static SLOTS: &[Slot] = &[
         "pixels",
         "images of 8 bits with or without alpha, of 16 bits, or linear ones",
         &[
-            told(when("linear", |plan| plan.needs.hdr), "linear pixels", |_| {
+            told(when("linear", |plan| plan.features.hdr), "linear pixels", |_| {
                 Some("the images are display-referred")
             }),
-            told(when("srgb16", |plan| plan.needs.deep), "16-bit pixels", |_| Some("no image has them")),
-            told(when("srgb8", |plan| plan.needs.alpha), "alpha", |plan| {
-                (!plan.needs.alpha && !plan.needs.hdr).then_some("the images are opaque")
+            told(when("srgb16", |plan| plan.features.deep), "16-bit pixels", |_| Some("no image has them")),
+            told(when("srgb8", |plan| plan.features.alpha), "alpha", |plan| {
+                (!plan.features.alpha && !plan.features.hdr).then_some("the images are opaque")
             }),
             told(otherwise("srgb8_opaque"), "8-bit pixels", |plan| {
-                (plan.needs.hdr || plan.needs.deep).then_some("not all images have them")
+                (plan.features.hdr || plan.features.deep).then_some("not all images have them")
             }),
         ],
     ),
@@ -75,7 +75,7 @@ pub(super) static SLOTS: &[Slot] = &[
         "position",
         "masks: with them, pixels that count are listed",
         &[
-            told(when("listed", |plan| plan.needs.masks), "masks", |_| Some("there are none")),
+            told(when("listed", |plan| plan.features.masks), "masks", |_| Some("there are none")),
             otherwise("all"),
         ],
     ),
@@ -119,7 +119,11 @@ pub(super) static SLOTS: &[Slot] = &[
         "`loss.color`; relative for linear images",
         &[
             told(when("relative", Plan::has_relative_loss), "the relative loss", |plan| {
-                Some(if plan.needs.hdr { "loss.color is squared" } else { "the images are display-referred" })
+                Some(if plan.features.hdr {
+                    "loss.color is squared"
+                } else {
+                    "the images are display-referred"
+                })
             }),
             otherwise("squared"),
         ],
@@ -136,7 +140,11 @@ pub(super) static SLOTS: &[Slot] = &[
             otherwise("solid"),
         ],
     ),
-    slot("activation", "linear images", &[when("exponential", |plan| plan.needs.hdr), otherwise("sigmoid")]),
+    slot(
+        "activation",
+        "linear images",
+        &[when("exponential", |plan| plan.features.hdr), otherwise("sigmoid")],
+    ),
     slot(
         "transmittance",
         "`transmittance`",

@@ -1,6 +1,6 @@
 //! Cells of the occupancy grid that can never hold anything: seen by no camera, or carved by silhouettes.
 //!
-//! Leaving them out from the start saves the first steps of a training, which would otherwise fill the box
+//! Leaving them out from the start saves the first steps of a training run, which would otherwise fill the box
 //! with fog and dissolve it again.
 
 use super::Space;
@@ -31,8 +31,11 @@ enum Sight {
 /// the alpha of several images shows to be empty.
 #[must_use]
 pub fn hidden_cells(cameras: &[Camera], silhouettes: &[Silhouette], space: &Space, cells: u32) -> Vec<bool> {
-    let views: Vec<_> =
-        cameras.iter().zip(silhouettes).map(|(camera, silhouette)| View::new(camera, silhouette)).collect();
+    let views: Vec<_> = cameras
+        .iter()
+        .zip(silhouettes)
+        .map(|(camera, silhouette)| CameraCone::new(camera, silhouette))
+        .collect();
     let carves = views.iter().any(|view| !view.silhouette.is_opaque());
     let count: usize = space.grid_shape(cells).iter().product();
     (0..count as u32)
@@ -44,7 +47,7 @@ pub fn hidden_cells(cameras: &[Camera], silhouettes: &[Silhouette], space: &Spac
         .collect()
 }
 
-fn is_hidden(views: &[View<'_>], carves: bool, center: DVec3, side: f64) -> bool {
+fn is_hidden(views: &[CameraCone<'_>], carves: bool, center: DVec3, side: f64) -> bool {
     let radius = side * 3f64.sqrt() / 2.0;
     let mut seen = false;
     let mut empty = 0;
@@ -64,7 +67,7 @@ fn is_hidden(views: &[View<'_>], carves: bool, center: DVec3, side: f64) -> bool
     !seen && empty == 0
 }
 
-struct View<'a> {
+struct CameraCone<'a> {
     camera: &'a Camera,
     /// Largest angle of a pixel's ray to the view axis, in radians: what lies outside this cone need not be
     /// projected. π where the rays form no cone.
@@ -72,7 +75,7 @@ struct View<'a> {
     silhouette: &'a Silhouette,
 }
 
-impl<'a> View<'a> {
+impl<'a> CameraCone<'a> {
     fn new(camera: &'a Camera, silhouette: &'a Silhouette) -> Self {
         Self { camera, half_angle: half_angle(camera), silhouette }
     }

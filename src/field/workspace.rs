@@ -4,10 +4,10 @@ use super::Plan;
 use super::link::group_size;
 use super::parameters::{Array, Numbers};
 use crate::gpu::Gpu;
-use crate::gpu::banks::Banks;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::demand::{Allocation, Demand};
+use crate::gpu::buffer_spec::{Allocation, BufferSpec};
 use crate::gpu::kernel::{Bound, Kernel, Resource};
+use crate::gpu::paged_array::PagedArray;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Tensor;
 use anyhow::{Context, Result, ensure};
@@ -17,7 +17,7 @@ use anyhow::{Context, Result, ensure};
 pub struct Workspace {
     buffers: Vec<Buffer>,
     tensors: Vec<Tensor>,
-    banks: Option<Banks>,
+    pages: Option<PagedArray>,
 }
 
 impl Workspace {
@@ -35,9 +35,9 @@ impl Workspace {
     ///
     /// # Errors
     /// When the adapter cannot hold it.
-    pub fn allocate(&mut self, gpu: &Gpu, demands: &[Demand]) -> Result<()> {
-        for demand in demands {
-            match demand.allocate(gpu)? {
+    pub fn allocate(&mut self, gpu: &Gpu, buffers: &[BufferSpec]) -> Result<()> {
+        for spec in buffers {
+            match spec.allocate(gpu)? {
                 Allocation::Buffer(buffer) => self.add(buffer),
                 Allocation::Tensor(tensor) => self.add_tensor(tensor),
             }
@@ -55,17 +55,17 @@ impl Workspace {
         self.tensors.push(tensor);
     }
 
-    /// Adds the banks that hold the training photos.
-    pub fn add_banks(&mut self, banks: Banks) {
-        self.banks = Some(banks);
+    /// Adds the pages that hold the training photos.
+    pub fn add_pages(&mut self, pages: PagedArray) {
+        self.pages = Some(pages);
     }
 
-    /// The part that reads the banks.
+    /// The part that reads the pages.
     ///
     /// # Errors
-    /// When there are none: only a training has photos.
-    pub fn banks_part(&self) -> Result<String> {
-        Ok(self.banks.as_ref().context("this workspace has no photos")?.part())
+    /// When there are none: only a training run has photos.
+    pub fn pages_part(&self) -> Result<String> {
+        Ok(self.pages.as_ref().context("this workspace has no photos")?.part())
     }
 
     /// The buffer `name`.
@@ -189,7 +189,7 @@ impl Workspace {
         }
         resources.extend(self.buffers.iter().map(Buffer::resource));
         resources.extend(self.tensors.iter().map(|tensor| tensor.named(tensor.name)));
-        resources.extend(self.banks.iter().flat_map(Banks::resources));
+        resources.extend(self.pages.iter().flat_map(PagedArray::resources));
         kernel.bind(gpu, &resources)
     }
 
@@ -218,7 +218,7 @@ impl Workspace {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let buffers: u64 = self.buffers.iter().map(|buffer| buffer.raw.size()).sum();
-        let banks: u64 = self.banks.iter().map(Banks::bytes).sum();
-        buffers + banks + self.tensors.iter().map(Tensor::bytes).sum::<u64>()
+        let pages: u64 = self.pages.iter().map(PagedArray::bytes).sum();
+        buffers + pages + self.tensors.iter().map(Tensor::bytes).sum::<u64>()
     }
 }

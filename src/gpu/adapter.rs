@@ -4,9 +4,9 @@ use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Result, bail};
 use serde::Serialize;
 
-/// What `nerf adapters` tells of one adapter.
+/// What `nerf adapters` prints about one adapter.
 #[derive(Clone, Debug, Serialize)]
-pub struct Listing {
+pub struct AdapterEntry {
     /// The index that [`choose`] takes.
     pub index: usize,
     /// The adapter's name.
@@ -26,7 +26,7 @@ pub struct Listing {
     pub subgroup_sizes: [u32; 2],
     /// The matrix products that it has units for.
     pub cooperative_matrices: Vec<MatrixSize>,
-    /// All that wgpu tells of its limits.
+    /// All that wgpu says of its limits.
     pub limits: wgpu::Limits,
 }
 
@@ -67,11 +67,11 @@ pub fn enumerate() -> Vec<wgpu::Adapter> {
 
 /// Describes `adapters` in their order.
 #[must_use]
-pub fn list(adapters: &[wgpu::Adapter]) -> Vec<Listing> {
+pub fn list(adapters: &[wgpu::Adapter]) -> Vec<AdapterEntry> {
     adapters.iter().enumerate().map(|(index, adapter)| describe(index, adapter)).collect()
 }
 
-fn describe(index: usize, adapter: &wgpu::Adapter) -> Listing {
+fn describe(index: usize, adapter: &wgpu::Adapter) -> AdapterEntry {
     let info = adapter.get_info();
     let features = [
         ("float32-atomics", wgpu::Features::SHADER_FLOAT32_ATOMIC),
@@ -88,7 +88,7 @@ fn describe(index: usize, adapter: &wgpu::Adapter) -> Listing {
         factors: size.ab_type,
         sums: size.cr_type,
     });
-    Listing {
+    AdapterEntry {
         index,
         kind: format!("{:?}", info.device_type),
         backend: format!("{:?}", info.backend),

@@ -18,7 +18,7 @@ impl Gpu {
     /// A zeroed storage buffer of `count` elements of `T`.
     ///
     /// # Errors
-    /// When it is larger than the adapter can bind; the message tells both sizes.
+    /// When it is larger than the adapter can bind; the message says both sizes.
     pub fn storage<T>(&self, name: &'static str, count: usize) -> Result<Buffer> {
         self.buffer(name, (count * size_of::<T>()) as u64, Usage::STORAGE)
     }

@@ -3,15 +3,15 @@
 use super::Gpu;
 use super::buffer::Buffer;
 use super::source::{Binding, Linked, Source};
-use super::tensor::{Place, Tensor};
+use super::tensor::{Tensor, TensorStorage};
 use anyhow::{Result, anyhow, bail};
 use std::borrow::Cow;
 use wgpu::naga;
 
 /// Name, fields and size of a `#[repr(C)]` struct that is shared with WGSL.
 #[derive(Clone, Copy, Debug)]
-pub struct Layout {
-    /// The struct's name in both languages.
+pub struct StructLayout {
+    /// The struct's name in WGSL.
     pub name: &'static str,
     /// Each field with its byte offset.
     pub fields: &'static [(&'static str, usize)],
@@ -22,20 +22,23 @@ pub struct Layout {
 /// A struct shared with WGSL; made by [`crate::gpu_struct!`].
 pub trait Shared: bytemuck::Pod {
     /// Where its fields lie.
-    const LAYOUT: Layout;
+    const LAYOUT: StructLayout;
 }
 
-/// Defines a `#[repr(C)]` struct of plain numbers together with its field list.
+/// Defines a `#[repr(C)]` struct of plain numbers together with its field list. `Name as Other` is called `Other` in WGSL.
 #[macro_export]
 macro_rules! gpu_struct {
-    ($(#[$meta:meta])* $name:ident { $($(#[$field_meta:meta])* $field:ident: $kind:ty),* $(,)? }) => {
+    ($(#[$meta:meta])* $name:ident { $($fields:tt)* }) => {
+        $crate::gpu_struct! { $(#[$meta])* $name as $name { $($fields)* } }
+    };
+    ($(#[$meta:meta])* $name:ident as $wgsl:ident { $($(#[$field_meta:meta])* $field:ident: $kind:ty),* $(,)? }) => {
         $(#[$meta])*
         #[repr(C)]
         #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
         pub struct $name { $($(#[$field_meta])* pub $field: $kind),* }
         impl $crate::gpu::kernel::Shared for $name {
-            const LAYOUT: $crate::gpu::kernel::Layout = $crate::gpu::kernel::Layout {
-                name: stringify!($name),
+            const LAYOUT: $crate::gpu::kernel::StructLayout = $crate::gpu::kernel::StructLayout {
+                name: stringify!($wgsl),
                 fields: &[$((stringify!($field), core::mem::offset_of!($name, $field))),*],
                 size: core::mem::size_of::<$name>(),
             };
@@ -100,8 +103,8 @@ impl Tensor {
     #[must_use]
     pub fn named<'a>(&'a self, name: &'a str) -> Resource<'a> {
         let binding = match &self.place {
-            Place::Buffer(buffer) => buffer.as_entire_binding(),
-            Place::Texture(_, view) => wgpu::BindingResource::TextureView(view),
+            TensorStorage::Buffer(buffer) => buffer.as_entire_binding(),
+            TensorStorage::Texture(_, view) => wgpu::BindingResource::TextureView(view),
         };
         Resource { name, binding }
     }
@@ -112,7 +115,7 @@ impl Kernel {
     ///
     /// # Errors
     /// When the WGSL does not link, a struct differs from Rust's, or the driver refuses the pipeline.
-    pub fn new(gpu: &Gpu, source: &Source, layouts: &[Layout]) -> Result<Self> {
+    pub fn new(gpu: &Gpu, source: &Source, layouts: &[StructLayout]) -> Result<Self> {
         let Linked { label, module, bindings, group_size } = source.link()?;
         for layout in layouts {
             compare_layout(&label, &module, layout)?;
@@ -188,7 +191,7 @@ fn layout_entries(bindings: &[Binding]) -> Vec<wgpu::BindGroupLayoutEntry> {
 }
 
 /// Compares a Rust struct with the WGSL struct of the same name.
-fn compare_layout(label: &str, module: &naga::Module, layout: &Layout) -> Result<()> {
+fn compare_layout(label: &str, module: &naga::Module, layout: &StructLayout) -> Result<()> {
     let found = module.types.iter().find(|(_, kind)| kind.name.as_deref() == Some(layout.name));
     let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
         return Ok(());

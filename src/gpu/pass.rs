@@ -1,4 +1,4 @@
-//! A list of dispatches: what one step of the training does, in order.
+//! A list of dispatches: what one training step does, in order.
 
 use super::Gpu;
 use super::buffer::Buffer;

@@ -3,7 +3,7 @@
 //! A part declares the buffers it touches without `@group` and `@binding`; the linker numbers them, and
 //! [`super::kernel::Kernel`] binds them by name.
 
-use super::tensor::{self, Element, Memory};
+use super::tensor::{self, Element, TensorMemory};
 use anyhow::{Result, anyhow};
 use std::fmt::{Display, Write};
 use wgpu::naga;
@@ -12,7 +12,7 @@ use wgpu::naga;
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     label: String,
-    memory: Memory,
+    memory: TensorMemory,
     constants: String,
     parts: Vec<(String, String)>,
 }
@@ -48,7 +48,7 @@ impl Source {
 
     /// Chooses where the kernel's tensors live.
     #[must_use]
-    pub fn memory(self, memory: Memory) -> Self {
+    pub fn memory(self, memory: TensorMemory) -> Self {
         Self { memory, ..self }
     }
 
@@ -196,8 +196,8 @@ fn binding_type(module: &naga::Module, variable: &naga::GlobalVariable) -> wgpu:
 fn texture_format(format: naga::StorageFormat) -> wgpu::TextureFormat {
     match format {
         naga::StorageFormat::Rg32Float => Element::Vec2.format(),
-        naga::StorageFormat::Rg32Uint => Element::Pair.format(),
-        naga::StorageFormat::R32Uint => Element::Word.format(),
+        naga::StorageFormat::Rg32Uint => Element::Vec2u.format(),
+        naga::StorageFormat::R32Uint => Element::U32.format(),
         _ => Element::Vec4.format(),
     }
 }

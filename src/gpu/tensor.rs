@@ -13,7 +13,7 @@ use bytemuck::Pod;
 
 /// Where the tensors of a kernel live.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Memory {
+pub enum TensorMemory {
     /// Storage buffers.
     #[default]
     Buffers,
@@ -36,13 +36,13 @@ pub enum Element {
     /// `vec2<f32>`
     Vec2,
     /// `vec2<u32>`
-    Pair,
+    Vec2u,
     /// `u32`
-    Word,
+    U32,
 }
 
 impl Element {
-    const ALL: [Self; 4] = [Self::Vec4, Self::Vec2, Self::Pair, Self::Word];
+    const ALL: [Self; 4] = [Self::Vec4, Self::Vec2, Self::Vec2u, Self::U32];
 
     /// The WGSL type.
     #[must_use]
@@ -50,8 +50,8 @@ impl Element {
         match self {
             Self::Vec4 => "vec4<f32>",
             Self::Vec2 => "vec2<f32>",
-            Self::Pair => "vec2<u32>",
-            Self::Word => "u32",
+            Self::Vec2u => "vec2<u32>",
+            Self::U32 => "u32",
         }
     }
 
@@ -60,8 +60,8 @@ impl Element {
     pub fn bytes(self) -> usize {
         match self {
             Self::Vec4 => 16,
-            Self::Vec2 | Self::Pair => 8,
-            Self::Word => 4,
+            Self::Vec2 | Self::Vec2u => 8,
+            Self::U32 => 4,
         }
     }
 
@@ -71,8 +71,8 @@ impl Element {
         match self {
             Self::Vec4 => wgpu::TextureFormat::Rgba32Float,
             Self::Vec2 => wgpu::TextureFormat::Rg32Float,
-            Self::Pair => wgpu::TextureFormat::Rg32Uint,
-            Self::Word => wgpu::TextureFormat::R32Uint,
+            Self::Vec2u => wgpu::TextureFormat::Rg32Uint,
+            Self::U32 => wgpu::TextureFormat::R32Uint,
         }
     }
 
@@ -81,8 +81,8 @@ impl Element {
         match self {
             Self::Vec4 => ("rgba32float", "f32", "", "value"),
             Self::Vec2 => ("rg32float", "f32", ".xy", "vec4(value, 0.0, 0.0)"),
-            Self::Pair => ("rg32uint", "u32", ".xy", "vec4(value, 0u, 0u)"),
-            Self::Word => ("r32uint", "u32", ".x", "vec4(value, 0u, 0u, 0u)"),
+            Self::Vec2u => ("rg32uint", "u32", ".xy", "vec4(value, 0u, 0u)"),
+            Self::U32 => ("r32uint", "u32", ".x", "vec4(value, 0u, 0u, 0u)"),
         }
     }
 }
@@ -90,23 +90,23 @@ impl Element {
 /// Expands one declaration; `None` when `line` is none. The expansion is one line, so that positions in error
 /// messages stay true.
 #[must_use]
-pub fn expand(line: &str, memory: Memory) -> Option<String> {
+pub fn expand(line: &str, memory: TensorMemory) -> Option<String> {
     let (access, rest) = line.strip_prefix("tensor<")?.split_once("> ")?;
     let (name, kind) = rest.trim_end().strip_suffix(';')?.split_once(": ")?;
     let element = Element::ALL.into_iter().find(|element| element.wgsl() == kind)?;
     let (format, sampled, components, widened) = element.texel();
     let at = format!("vec2<u32>(index % {WIDTH}u, index / {WIDTH}u)");
     let (variable, load, store) = match (memory, access) {
-        (Memory::Buffers, _) => {
+        (TensorMemory::Buffers, _) => {
             let access = if access == "read" { "read" } else { "read_write" };
             let variable = format!("var<storage, {access}> {name}: array<{kind}>;");
             (variable, format!("{name}[index]"), format!("{name}[index] = value;"))
         }
-        (Memory::Textures, "read") => {
+        (TensorMemory::Textures, "read") => {
             let load = format!("textureLoad({name}, {at}, 0){components}");
             (format!("var {name}: texture_2d<{sampled}>;"), load, String::new())
         }
-        (Memory::Textures, access) => {
+        (TensorMemory::Textures, access) => {
             let variable = format!("var {name}: texture_storage_2d<{format}, {access}>;");
             let load = format!("textureLoad({name}, {at}){components}");
             (variable, load, format!("textureStore({name}, {at}, {widened});"))
@@ -132,12 +132,12 @@ pub struct Tensor {
     /// Number of elements.
     pub count: usize,
     /// Where they live.
-    pub place: Place,
+    pub place: TensorStorage,
 }
 
 /// Where a tensor lives.
 #[derive(Clone, Debug)]
-pub enum Place {
+pub enum TensorStorage {
     /// A storage buffer.
     Buffer(wgpu::Buffer),
     /// A texture and its only view.
@@ -154,8 +154,8 @@ impl Tensor {
     /// The commands that set it to zero.
     pub fn clear(&self, encoder: &mut wgpu::CommandEncoder) {
         match &self.place {
-            Place::Buffer(buffer) => encoder.clear_buffer(buffer, 0, None),
-            Place::Texture(texture, _) => {
+            TensorStorage::Buffer(buffer) => encoder.clear_buffer(buffer, 0, None),
+            TensorStorage::Texture(texture, _) => {
                 encoder.clear_texture(texture, &wgpu::ImageSubresourceRange::default());
             }
         }
@@ -165,24 +165,30 @@ impl Tensor {
 impl Gpu {
     /// The memory that suits this adapter.
     #[must_use]
-    pub fn fast_memory(&self) -> Memory {
-        if self.is_cpu() && self.has(TEXTURE_FEATURES) { Memory::Textures } else { Memory::Buffers }
+    pub fn fast_memory(&self) -> TensorMemory {
+        if self.is_cpu() && self.has(TEXTURE_FEATURES) {
+            TensorMemory::Textures
+        } else {
+            TensorMemory::Buffers
+        }
     }
 
     /// A zeroed tensor.
     ///
     /// # Errors
-    /// When it is larger than the adapter can bind; the message tells both sizes.
+    /// When it is larger than the adapter can bind; the message says both sizes.
     pub fn tensor(
         &self,
         name: &'static str,
         element: Element,
         count: usize,
-        memory: Memory,
+        memory: TensorMemory,
     ) -> Result<Tensor> {
         let place = match memory {
-            Memory::Buffers => Place::Buffer(self.storage::<u8>(name, count * element.bytes())?.raw),
-            Memory::Textures => self.texture(name, element, count)?,
+            TensorMemory::Buffers => {
+                TensorStorage::Buffer(self.storage::<u8>(name, count * element.bytes())?.raw)
+            }
+            TensorMemory::Textures => self.texture(name, element, count)?,
         };
         Ok(Tensor { name, element, count, place })
     }
@@ -199,7 +205,7 @@ impl Gpu {
         Ok(())
     }
 
-    fn texture(&self, name: &'static str, element: Element, count: usize) -> Result<Place> {
+    fn texture(&self, name: &'static str, element: Element, count: usize) -> Result<TensorStorage> {
         self.check_texture(name, count)?;
         let rows = texture_rows(count);
         use wgpu::TextureUsages as Usage;
@@ -214,15 +220,15 @@ impl Gpu {
             view_formats: &[],
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Ok(Place::Texture(texture, view))
+        Ok(TensorStorage::Texture(texture, view))
     }
 
     /// Writes `data` at the tensor's start, before the next submission.
     pub fn write_tensor<T: Pod>(&self, tensor: &Tensor, data: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         match &tensor.place {
-            Place::Buffer(buffer) => self.queue.write_buffer(buffer, 0, bytes),
-            Place::Texture(texture, _) => {
+            TensorStorage::Buffer(buffer) => self.queue.write_buffer(buffer, 0, bytes),
+            TensorStorage::Texture(texture, _) => {
                 let row = WIDTH * tensor.element.bytes();
                 let mut padded = bytes.to_vec();
                 padded.resize(bytes.len().next_multiple_of(row), 0);
@@ -249,8 +255,8 @@ impl Gpu {
     /// When the device was lost.
     pub fn read_tensor<T: Pod>(&self, tensor: &Tensor, count: usize) -> Result<Vec<T>> {
         let bytes = count * size_of::<T>();
-        let (Place::Texture(texture, _), 1..) = (&tensor.place, count) else {
-            let Place::Buffer(buffer) = &tensor.place else { return Ok(Vec::new()) };
+        let (TensorStorage::Texture(texture, _), 1..) = (&tensor.place, count) else {
+            let TensorStorage::Buffer(buffer) = &tensor.place else { return Ok(Vec::new()) };
             return self.read(&super::buffer::Buffer { name: tensor.name, raw: buffer.clone() }, 0, count);
         };
         let row = WIDTH * tensor.element.bytes();

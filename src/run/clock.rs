@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::config::schedule::Budget;
-use crate::field::checkpoint::About;
+use crate::field::checkpoint::Metadata;
 use std::sync::Arc;
 
 /// Seconds of training, which pass while steps are taken and stand still otherwise, and the budget they are spent of.
@@ -15,14 +15,14 @@ pub struct StepClock {
 }
 
 impl StepClock {
-    /// The clock of the run that `about` describes, whose log tells of `logged` seconds: a deterministic run's checkpoint
-    /// does not tell how long it took, and a log may be lost or lag behind.
+    /// The clock of the run that `metadata` describes, whose log counts `logged` seconds: a deterministic run's checkpoint
+    /// does not say how long it took, and a log may be lost or lag behind.
     #[must_use]
-    pub fn new(about: &About, logged: f64) -> Self {
+    pub fn new(metadata: &Metadata, logged: f64) -> Self {
         Self {
-            budget: about.budget,
-            config: Arc::clone(&about.config),
-            seconds: about.seconds.max(logged),
+            budget: metadata.budget,
+            config: Arc::clone(&metadata.config),
+            seconds: metadata.seconds.max(logged),
             seconds_per_step: 0.0,
         }
     }
@@ -33,7 +33,7 @@ impl StepClock {
         self.seconds
     }
 
-    /// What a checkpoint may tell of the seconds: 0 of a deterministic run, since no two runs take the same time. The log
+    /// The seconds that a checkpoint may hold: 0 of a deterministic run, since no two runs take the same time. The log
     /// has them.
     #[must_use]
     pub fn recorded_seconds(&self) -> f64 {

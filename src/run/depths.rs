@@ -7,7 +7,7 @@
 pub use super::onlookers::Onlookers;
 use crate::camera::Camera;
 use crate::capture::focus::median;
-use crate::field::render::View;
+use crate::field::renderer::View;
 use crate::support::format::percent;
 use glam::DVec2;
 use std::iter::Sum;
@@ -116,14 +116,14 @@ fn bin(distance: f64) -> usize {
     place.clamp(0.0, (BINS - 1) as f64) as usize
 }
 
-/// The median of the depths that are told (above 0), in their unit; 1 where none is.
+/// The median of the known depths (above 0), in their unit; 1 where none is.
 #[must_use]
 pub fn median_depth(depth: &[f32]) -> f64 {
     let median = median(depth.iter().filter(|z| **z > 0.0).map(|&z| f64::from(z)));
     if median.is_finite() { median } else { 1.0 }
 }
 
-/// What a near share tells, if it is one of fog.
+/// The warning for a near share that looks like fog.
 #[must_use]
 pub fn fog(near_share: f64) -> Option<String> {
     (near_share > FOG).then(|| {

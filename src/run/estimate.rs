@@ -1,19 +1,19 @@
-//! How much memory a training on a dataset would take, before anything is loaded.
+//! How much memory training on a dataset would take, before anything is loaded.
 
-use super::memory::Memory;
-use super::photos::TrainingPhotos;
+use super::memory::MemoryUse;
+use super::training_photos::TrainingPhotos;
 use crate::capture::dataset::Dataset;
 use crate::config::Config;
 use crate::field::{Capabilities, Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
-use crate::gpu::banks::Capacity;
+use crate::gpu::paged_array::PageCapacity;
 use anyhow::Result;
 
-/// What a training with the settings for its adapter takes.
+/// What a training run with the settings for its adapter takes.
 #[derive(Debug)]
 pub struct Estimate {
     /// Bytes.
-    pub memory: Memory,
+    pub memory: MemoryUse,
     /// The adapter; without one, the settings are those of a GPU.
     pub adapter: Option<String>,
     /// Whether device memory is host memory.
@@ -29,7 +29,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// For a training on the training frames of `dataset` on `gpu`, or on a usual GPU where there is none.
+    /// For a training run on the training frames of `dataset` on `gpu`, or on a usual GPU where there is none.
     ///
     /// # Errors
     /// When the settings ask for what the photos do not have.
@@ -43,7 +43,7 @@ impl Estimate {
             memory,
             adapter: gpu.map(|gpu| gpu.info.name.clone()),
             is_cpu: adapter.is_cpu,
-            most_photo_bytes: gpu.map(|gpu| Capacity::of(&gpu.device.limits(), plan.memory).bytes()),
+            most_photo_bytes: gpu.map(|gpu| PageCapacity::of(&gpu.device.limits(), plan.memory).bytes()),
             finest: plan.layout.levels.last().map_or(0, |level| level.resolution),
             left_out: plan.left_out(),
             excess: gpu.and_then(|gpu| memory.check(gpu, &plan).err()),

@@ -4,9 +4,9 @@ use super::depths::{Depths, Onlookers, median_depth};
 use super::event::{Event, Observer, Warning};
 use super::scores::{Means, Score, Scores};
 use crate::capture::dataset::Dataset;
-use crate::field::render::Renderer;
+use crate::field::renderer::Renderer;
 use crate::photo::Photo;
-use crate::photo::color::{ColorSpace, photo_over};
+use crate::photo::color_space::{ColorSpace, photo_over};
 use crate::support::metrics::{filled, psnr_where, ssim};
 use anyhow::Result;
 use std::time::Instant;
@@ -160,7 +160,7 @@ impl<'a> Evaluator<'a> {
 }
 
 /// How many views to render next, of `left` ones, where `done` ones have taken `seconds` of `limit`: the first one
-/// always; later as many as fit, but at most as many as there are to judge by.
+/// always; later as many as fit, but at most as many as there are.
 fn affordable(limit: Option<f64>, seconds: f64, done: usize, left: usize) -> usize {
     match limit {
         None => left,

@@ -1,10 +1,10 @@
-//! What a run tells while it goes on: one list of events, and who listens.
+//! What a run reports while it goes on: one list of events, and who listens.
 
-use super::memory::Memory;
+use super::memory::MemoryUse;
 use super::scores::Means;
 use super::stepper::Block;
 use crate::field::Plan;
-use crate::field::checkpoint::About;
+use crate::field::checkpoint::Metadata;
 use crate::gpu::Gpu;
 use crate::support::format::{count, few};
 use std::fmt;
@@ -27,7 +27,7 @@ pub enum Event<'a> {
     /// It is known what is trained on which device; nothing was loaded yet.
     Resolved {
         /// What the run's checkpoints say, at the first step of this session.
-        about: &'a About,
+        metadata: &'a Metadata,
         /// How the kernels are linked.
         plan: &'a Plan,
         /// The device.
@@ -35,8 +35,8 @@ pub enum Event<'a> {
         /// Number of test views.
         test_views: usize,
     },
-    /// What the training takes of the memory, before it is taken.
-    Memory(Memory),
+    /// What the run takes of the memory, before it is taken.
+    Memory(MemoryUse),
     /// So many training photos are on the device.
     Loading {
         /// So many, from 0 on.

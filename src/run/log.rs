@@ -26,7 +26,7 @@ pub enum LogRow {
 /// The rows of a log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Log {
-    /// Beginnings of the training, one per session.
+    /// Beginnings of the run, one per session.
     pub starts: Vec<Start>,
     /// Blocks of steps.
     pub steps: Vec<Steps>,
@@ -116,13 +116,13 @@ pub struct Stages {
     /// Steps that were timed.
     pub steps: u64,
     /// The stages, the longest first.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<StageTime>,
 }
 
 /// One stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Stage {
+pub struct StageTime {
     /// Its name.
     pub stage: String,
     /// Milliseconds per step on the device.
@@ -227,7 +227,7 @@ impl Log {
         (seconds > 0.0).then(|| samples / seconds)
     }
 
-    /// The last evaluation at the end of a training: one with SSIM.
+    /// The last evaluation at the end of a training run: one with SSIM.
     #[must_use]
     pub fn result(&self) -> Option<&Evaluation> {
         self.evaluations.iter().rev().find(|row| row.eval_ssim.is_some())

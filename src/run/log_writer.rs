@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 pub struct LogWriter {
     path: PathBuf,
     file: File,
-    /// Seconds of training that the rows before tell of.
+    /// Seconds of training of the rows before.
     seconds: f64,
 }
 
@@ -49,7 +49,7 @@ impl LogWriter {
         Ok(Self { path: path.to_owned(), file, seconds })
     }
 
-    /// Seconds of training that the rows of earlier sessions tell of.
+    /// Seconds of training in the rows of earlier sessions.
     #[must_use]
     pub fn logged_seconds(&self) -> f64 {
         self.seconds

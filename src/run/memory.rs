@@ -1,11 +1,11 @@
-//! What a training takes of the host's memory and of the device's, told before a photo is loaded.
+//! What training takes of the host's memory and of the device's, estimated before a photo is loaded.
 
 use crate::camera::Camera;
 use crate::field::Plan;
-use crate::field::render::Renderer;
+use crate::field::renderer::Renderer;
 use crate::gpu::Gpu;
-use crate::gpu::banks::Capacity;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
+use crate::gpu::paged_array::PageCapacity;
 use crate::support::format::bytes;
 use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Result, anyhow};
@@ -15,9 +15,9 @@ use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 /// Bytes of the program itself, its driver and the kernels that it compiles.
 const BASE_BYTES: u64 = 640 << 20;
 
-/// Bytes at the peak of a training.
+/// Bytes at the peak of a training run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Memory {
+pub struct MemoryUse {
     /// On the host, without what the device holds.
     pub host_bytes: u64,
     /// On the device; of a CPU adapter, this is memory of the host too.
@@ -26,14 +26,14 @@ pub struct Memory {
     pub photo_bytes: u64,
 }
 
-impl Memory {
-    /// What a training of `plan` takes whose photos `cameras` took; loading them takes `stream_bytes`.
+impl MemoryUse {
+    /// What training `plan` takes with the photos that `cameras` took; loading them takes `stream_bytes`.
     #[must_use]
     pub fn of_training(plan: &Plan, cameras: &[Camera], stream_bytes: u64) -> Self {
         let pixels = cameras.iter().map(|camera| camera.width as usize * camera.height as usize);
         let photo_bytes = plan.photo_bytes(pixels);
-        let demands = plan.training_demands(plan.cell_count());
-        let fixed: u64 = demands.iter().map(Demand::bytes).sum();
+        let buffers = plan.training_buffers(plan.cell_count());
+        let fixed: u64 = buffers.iter().map(BufferSpec::bytes).sum();
         // Parameters are drawn on the host first, and read back for checkpoints.
         let parameters = (plan.layout.entries * 6 + plan.layout.quads * 12) as u64 * 4;
         Self {
@@ -49,7 +49,7 @@ impl Memory {
     /// When it does not: says how much there is, and what to do.
     pub fn check(&self, gpu: &Gpu, plan: &Plan) -> Result<()> {
         plan.check(gpu)?;
-        let capacity = Capacity::of(&gpu.device.limits(), plan.memory).bytes();
+        let capacity = PageCapacity::of(&gpu.device.limits(), plan.memory).bytes();
         if self.photo_bytes > capacity {
             let found = format!(
                 "the photos take {} on the device, and the adapter '{}' binds {} of them at most; ",
@@ -63,7 +63,7 @@ impl Memory {
         if let Some(available) = available_bytes().filter(|&available| available < on_host) {
             let others = on_host - self.photo_bytes;
             let found = format!(
-                "the training takes {} of memory, and this machine has {} left; ",
+                "training takes {} of memory, and this machine has {} left; ",
                 bytes(on_host),
                 bytes(available),
             );
@@ -91,7 +91,7 @@ fn fitting(needed: u64, available: u64) -> Option<Remedy> {
     })
 }
 
-/// Memory that the host can still give, within the limits of its container; `None` where the system does not tell.
+/// Memory that the host can still give, within the limits of its container; `None` where the system does not say.
 #[must_use]
 pub fn available_bytes() -> Option<u64> {
     let memory = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());

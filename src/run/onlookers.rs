@@ -99,7 +99,7 @@ mod tests {
         }
     }
 
-    /// As many as there are of a training on few photos, which are the ones that end in fog.
+    /// As many as there are of a training run on few photos, which are the ones that end in fog.
     #[test]
     fn of_few_cameras_one_is_few() {
         let cameras = circle(5);

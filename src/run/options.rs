@@ -14,7 +14,7 @@ const GPU_STEPS: u32 = 20_000;
 /// resumed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrainOptions {
-    /// The dataset's path, as it was given; checkpoints tell it.
+    /// The dataset's path, as it was given; checkpoints hold it.
     pub dataset: String,
     /// A JSON file with settings.
     pub config: Option<PathBuf>,
@@ -42,7 +42,7 @@ pub struct EvaluationOptions {
 /// Which test views are measured at the end of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EvaluationAtEnd {
-    /// Evenly spaced ones, at least one, for at most a tenth of the training's seconds; all of a deterministic run.
+    /// Evenly spaced ones, at least one, for at most a tenth of the training time; all of a deterministic run.
     #[default]
     Share,
     /// All.

@@ -1,7 +1,7 @@
-//! The page about a training: one HTML file that needs neither network nor script.
+//! The page about a training run: one HTML file that needs neither network nor script.
 //!
 //! Data in, text out: the rows of a run's log ([`log`](super::log)), the scores of the test views and small pictures of some of
-//! them ([`views`], [`pictures`]) become curves, tables and images in one page.
+//! them ([`test_views`], [`pictures`]) become curves, tables and images in one page.
 
 mod colormap;
 mod curves;
@@ -9,22 +9,22 @@ mod distances;
 mod measure;
 mod page;
 pub mod pictures;
+pub mod test_views;
 mod time;
-pub mod views;
 
-use crate::field::checkpoint::About;
+use crate::field::checkpoint::Metadata;
 use crate::run::log::Log;
 use crate::support::file::write_atomically;
 use anyhow::{Context, Result};
 use std::io::Write;
 use std::path::Path;
 use std::time::SystemTime;
-use views::{Outcome, TestViews};
+use test_views::{ScoreSummary, TestViews};
 
-/// What is known about a training; everything may be missing.
+/// What is known about a training run; everything may be missing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
-    /// The folder of the training.
+    /// The folder of the run.
     pub run: String,
     /// The dataset as it was named.
     pub dataset: Option<String>,
@@ -36,7 +36,7 @@ pub struct Facts {
     pub steps: Option<u64>,
     /// Seconds of training.
     pub seconds: Option<f64>,
-    /// Whether the training has reached the end it was given.
+    /// Whether the run has reached the end it was given.
     pub is_done: Option<bool>,
     /// Number of views trained on.
     pub train_views: Option<usize>,
@@ -47,27 +47,27 @@ pub struct Facts {
 }
 
 impl Facts {
-    /// What the description of a field tells of the run in `folder`, at its step and seconds.
+    /// What a checkpoint's metadata says about the run in `folder`, at its step and seconds.
     ///
     /// # Errors
     /// Never for settings that were read or resolved.
-    pub fn of(folder: &Path, about: &About) -> Result<Self> {
+    pub fn of(folder: &Path, metadata: &Metadata) -> Result<Self> {
         Ok(Self {
             run: folder.display().to_string(),
-            dataset: Some(about.dataset.clone()),
+            dataset: Some(metadata.dataset.clone()),
             trained: None,
-            adapter: Some(about.adapter.clone()),
-            steps: Some(u64::from(about.step)),
-            seconds: Some(about.seconds),
-            is_done: Some(about.budget.is_spent(about.step, about.seconds)),
-            train_views: Some(about.splits.train.len()),
-            hdr: about.needs.hdr,
-            settings: Some(serde_json::to_string_pretty(&about.config)?),
+            adapter: Some(metadata.adapter.clone()),
+            steps: Some(u64::from(metadata.step)),
+            seconds: Some(metadata.seconds),
+            is_done: Some(metadata.budget.is_spent(metadata.step, metadata.seconds)),
+            train_views: Some(metadata.splits.train.len()),
+            hdr: metadata.features.hdr,
+            settings: Some(serde_json::to_string_pretty(&metadata.config)?),
         })
     }
 }
 
-/// A training to write about.
+/// A training run to write about.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// What is known about it.
@@ -100,11 +100,11 @@ impl Report {
     /// What the test views say of the field as it was left: as measured for this page, else as logged at its last
     /// step.
     #[must_use]
-    pub fn outcome(&self) -> Option<Outcome> {
-        let measured = self.views.as_ref().ok().and_then(TestViews::outcome);
+    pub fn summary(&self) -> Option<ScoreSummary> {
+        let measured = self.views.as_ref().ok().and_then(TestViews::summary);
         let logged = || {
             let row = self.log.result().filter(|row| self.steps().is_none_or(|steps| steps == row.step))?;
-            Some(Outcome {
+            Some(ScoreSummary {
                 psnr: row.eval_psnr?,
                 ssim: row.eval_ssim?,
                 views: row.views,

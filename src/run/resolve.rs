@@ -2,21 +2,21 @@
 
 use super::evaluate::Evaluator;
 use super::event::{Event, Observer};
-use super::features::NO_FRAME;
 use super::options::TrainOptions;
-use super::photos::TrainingPhotos;
+use super::scene_features::NO_FRAME;
+use super::training_photos::TrainingPhotos;
 use crate::camera::orbit::Orbit;
 use crate::capture::dataset::{Dataset, evenly_spaced};
 use crate::config::Config;
 use crate::config::schedule::Budget;
-use crate::field::checkpoint::{About, Checkpoint, FORMAT, Splits};
+use crate::field::checkpoint::{Checkpoint, FORMAT, Metadata, SplitNames};
 use crate::field::layout::{Layout, finest_resolution};
-use crate::field::render::Renderer;
+use crate::field::renderer::Renderer;
 use crate::field::state::State;
 use crate::field::{Capabilities, Field, Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
 use crate::photo::Reading;
-use crate::photo::color::ColorSpace;
+use crate::photo::color_space::ColorSpace;
 use crate::support::format::few;
 use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Result, bail, ensure};
@@ -26,7 +26,7 @@ use std::fmt::Display;
 #[derive(Debug)]
 pub struct Resolved {
     /// What its checkpoints say, at the first step of this session.
-    pub about: About,
+    pub metadata: Metadata,
     /// How the kernels are linked.
     pub plan: Plan,
     /// Where an earlier session ended; `None` of a new run.
@@ -43,11 +43,11 @@ impl Resolved {
     /// # Errors
     /// When there is no frame to train on, a setting is unknown or out of range, or the photos are no use to it.
     pub fn new_run(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<Self> {
-        let about = first(options, dataset, gpu)?;
-        let about = ended(about, options, gpu, None)?;
-        let plan = about.plan(Capabilities::of(gpu));
+        let metadata = first(options, dataset, gpu)?;
+        let metadata = ended(metadata, options, gpu, None)?;
+        let plan = metadata.plan(Capabilities::of(gpu));
         let (train, test) = (dataset.train.clone(), dataset.test.clone());
-        Ok(Self { about, plan, state: None, train, test })
+        Ok(Self { metadata, plan, state: None, train, test })
     }
 
     /// The run that `checkpoint` holds, on the frames that it was trained on and with what `options` change.
@@ -61,15 +61,15 @@ impl Resolved {
         gpu: &Gpu,
         checkpoint: Checkpoint,
     ) -> Result<Self> {
-        let Checkpoint { about, state } = checkpoint;
+        let Checkpoint { metadata, state } = checkpoint;
         ensure!(!dataset.train.is_empty(), NO_FRAME);
-        same_reading(&about.reading, &dataset.reading)?;
-        let (train, test) = same_frames(&about, dataset)?;
-        let earlier = about.budget;
-        let about = again(options, about, dataset, &train)?;
-        let about = ended(about, options, gpu, Some(earlier))?;
-        let plan = about.plan(Capabilities::of(gpu));
-        Ok(Self { about, plan, state: Some(state), train, test })
+        same_reading(&metadata.reading, &dataset.reading)?;
+        let (train, test) = same_frames(&metadata, dataset)?;
+        let earlier = metadata.budget;
+        let metadata = again(options, metadata, dataset, &train)?;
+        let metadata = ended(metadata, options, gpu, Some(earlier))?;
+        let plan = metadata.plan(Capabilities::of(gpu));
+        Ok(Self { metadata, plan, state: Some(state), train, test })
     }
 
     /// The photos to train on.
@@ -78,7 +78,7 @@ impl Resolved {
         TrainingPhotos { dataset, frames: &self.train }
     }
 
-    /// Whether there is room for the training and its photos, on the host and on the device; tells what they take.
+    /// Whether there is room for training and its photos, on the host and on the device; reports what they take.
     ///
     /// # Errors
     /// When there is not; the message says how much there is, and what to do.
@@ -102,9 +102,9 @@ impl Resolved {
         if self.test.is_empty() {
             return Ok(None);
         }
-        let needs = &self.about.needs;
-        let renderer = Renderer::new(field, &needs.lenses)?;
-        let mut evaluator = Evaluator::new(renderer, ColorSpace::of(needs.hdr), dataset);
+        let features = &self.metadata.features;
+        let renderer = Renderer::new(field, &features.lenses)?;
+        let mut evaluator = Evaluator::new(renderer, ColorSpace::of(features.hdr), dataset);
         evaluator.keep(&evenly_spaced(&self.test, few))?;
         Ok(Some(evaluator))
     }
@@ -129,23 +129,23 @@ impl Config {
 }
 
 /// The description with its names and its end.
-fn ended(about: About, options: &TrainOptions, gpu: &Gpu, earlier: Option<Budget>) -> Result<About> {
+fn ended(metadata: Metadata, options: &TrainOptions, gpu: &Gpu, earlier: Option<Budget>) -> Result<Metadata> {
     let budget = options.budget(gpu.is_cpu(), earlier);
     budget.validate()?;
-    if about.config.deterministic && budget.seconds.is_some() {
+    if metadata.config.deterministic && budget.seconds.is_some() {
         let why = ": how many steps fit into a time differs from run to run";
-        bail!(Advised::new("a deterministic training needs ", Remedy::StepsAlone, why));
+        bail!(Advised::new("a deterministic run needs ", Remedy::StepsAlone, why));
     }
-    Ok(About { dataset: options.dataset.clone(), adapter: gpu.info.name.clone(), budget, ..about })
+    Ok(Metadata { dataset: options.dataset.clone(), adapter: gpu.info.name.clone(), budget, ..metadata })
 }
 
-fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<About> {
+fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<Metadata> {
     ensure!(!dataset.train.is_empty(), NO_FRAME);
     let bounds = dataset.bounds.clone();
     let config = options.configure(Config::for_dataset(dataset, gpu.is_cpu())?)?.with_finest(dataset);
     let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
     let orbit = Orbit::of(&dataset.cameras(&dataset.train), bounds.center);
-    Ok(About {
+    Ok(Metadata {
         format: FORMAT,
         dataset: String::new(),
         adapter: String::new(),
@@ -154,9 +154,13 @@ fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<About> 
         step_excess: 0.0,
         seconds: 0.0,
         budget: Budget::default(),
-        needs: SceneFeatures::of(dataset, &config)?,
+        features: SceneFeatures::of(dataset, &config)?,
         reading: dataset.reading.clone(),
-        splits: Splits { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) },
+        splits: SplitNames {
+            train: names(&dataset.train),
+            val: names(&dataset.val),
+            test: names(&dataset.test),
+        },
         image_size: [orbit.width, orbit.height],
         has_alpha: dataset.is_cutout,
         orbit,
@@ -166,16 +170,16 @@ fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<About> 
 }
 
 /// The description of an earlier session with what the options change; the field's size stays.
-fn again(options: &TrainOptions, about: About, dataset: &Dataset, train: &[usize]) -> Result<About> {
-    let config = options.configure(Config::clone(&about.config))?;
-    let is_same = Layout::new(&config) == Layout::new(&about.config)
-        && config.occupancy.cells == about.config.occupancy.cells;
+fn again(options: &TrainOptions, metadata: Metadata, dataset: &Dataset, train: &[usize]) -> Result<Metadata> {
+    let config = options.configure(Config::clone(&metadata.config))?;
+    let is_same = Layout::new(&config) == Layout::new(&metadata.config)
+        && config.occupancy.cells == metadata.config.occupancy.cells;
     if !is_same {
-        let found = "a training cannot change its grid, network or occupancy grid ";
+        let found = "a training run cannot change its grid, network or occupancy grid ";
         bail!(Advised::new(found, Remedy::SameField, ""));
     }
-    let needs = about.needs.clone().for_photos(dataset, train, &config)?;
-    Ok(About { needs, config: config.into(), ..about })
+    let features = metadata.features.clone().for_photos(dataset, train, &config)?;
+    Ok(Metadata { features, config: config.into(), ..metadata })
 }
 
 /// Photos must be read as before.
@@ -197,29 +201,29 @@ fn same_reading(then: &Reading, now: &Reading) -> Result<()> {
 }
 
 /// The frames that an earlier session used, by name.
-fn same_frames(about: &About, dataset: &Dataset) -> Result<(Vec<usize>, Vec<usize>)> {
-    let (train, missing) = dataset.find(&about.splits.train);
+fn same_frames(metadata: &Metadata, dataset: &Dataset) -> Result<(Vec<usize>, Vec<usize>)> {
+    let (train, missing) = dataset.find(&metadata.splits.train);
     ensure!(
         missing.is_empty(),
         "{} frames that were trained on are not in this dataset ({}); resume with the dataset that the \
          training began with, {}",
         missing.len(),
         few(&missing),
-        about.dataset
+        metadata.dataset
     );
-    let orbit = Orbit::of(&dataset.cameras(&train), about.bounds.center);
-    let is_same = [orbit.width, orbit.height] == about.image_size
-        && (orbit.radius - about.orbit.radius).abs() <= 1e-6 * orbit.radius;
+    let orbit = Orbit::of(&dataset.cameras(&train), metadata.bounds.center);
+    let is_same = [orbit.width, orbit.height] == metadata.image_size
+        && (orbit.radius - metadata.orbit.radius).abs() <= 1e-6 * orbit.radius;
     ensure!(
         is_same,
         "the frames of this dataset have other cameras than those trained on; resume with the dataset that the \
          training began with, {}",
-        about.dataset
+        metadata.dataset
     );
     ensure!(
-        about.needs.hdr == dataset.is_hdr,
-        "the training began with images of another kind (display-referred or linear); resume with {}",
-        about.dataset
+        metadata.features.hdr == dataset.is_hdr,
+        "the run began with images of another kind (display-referred or linear); resume with {}",
+        metadata.dataset
     );
-    Ok((train, dataset.find(&about.splits.test).0))
+    Ok((train, dataset.find(&metadata.splits.test).0))
 }

@@ -1,7 +1,7 @@
 //! How well views are rendered: one by one, and on average.
 
 use super::depths::Depths;
-use super::report::views::ViewScores;
+use super::report::test_views::ViewScores;
 use serde::{Serialize, Serializer};
 
 /// How well one view is rendered.
@@ -13,7 +13,7 @@ pub struct Score {
     pub psnr: f64,
     /// Structural similarity.
     pub ssim: f64,
-    /// How far away lies what it shows, if the cameras have a focus to tell it by; serialised as its near share.
+    /// How far away lies what it shows, if the cameras have a focus to measure it by; serialised as its near share.
     #[serde(rename = "near_share", serialize_with = "near_share")]
     pub depths: Option<Depths>,
     /// Number of pixels that masks ignore, if there are any.

@@ -15,8 +15,8 @@ use super::stepper::{Block, Stepper};
 use crate::capture::dataset::Dataset;
 use crate::config::schedule::Budget;
 use crate::field::Field;
-use crate::field::checkpoint::{About, Checkpoint};
-use crate::field::train::Trainer;
+use crate::field::checkpoint::{Checkpoint, Metadata};
+use crate::field::trainer::Trainer;
 use crate::gpu::Gpu;
 use crate::support::file::writable_folder;
 use crate::support::metrics::PSNR_CAP_DB;
@@ -49,7 +49,7 @@ pub struct TrainingRun<'a> {
 /// A training run under way.
 #[derive(Debug)]
 pub struct TrainingSession<'a> {
-    about: About,
+    metadata: Metadata,
     test: Vec<usize>,
     folder: RunFolder,
     evaluation: EvaluationOptions,
@@ -89,8 +89,8 @@ impl<'a> TrainingRun<'a> {
     /// written to.
     pub fn begin(self, observer: &mut dyn Observer) -> Result<TrainingSession<'a>> {
         let Self { gpu, dataset, mut resolved, folder, evaluation } = self;
-        let Resolved { about, plan, test, .. } = &resolved;
-        observer.notice(&Event::Resolved { about, plan, gpu: &gpu, test_views: test.len() });
+        let Resolved { metadata, plan, test, .. } = &resolved;
+        observer.notice(&Event::Resolved { metadata, plan, gpu: &gpu, test_views: test.len() });
         resolved.check_memory(&gpu, dataset, observer)?;
         writable_folder(folder.path())?;
         let clock = Instant::now();
@@ -107,21 +107,21 @@ impl<'a> TrainingRun<'a> {
             None => None,
         };
         let compile_seconds = clock.elapsed().as_secs_f64();
-        let Resolved { about, plan, test, .. } = resolved;
-        let mut log = folder.begin(&about.config, state.map(|state| state.step))?;
+        let Resolved { metadata, plan, test, .. } = resolved;
+        let mut log = folder.begin(&metadata.config, state.map(|state| state.step))?;
         log.write(&LogRow::Start(log::Start {
-            step: about.step.into(),
-            adapter: Some(about.adapter.clone()),
+            step: metadata.step.into(),
+            adapter: Some(metadata.adapter.clone()),
             driver: Some(format!("{} {}", gpu.info.driver, gpu.info.driver_info)),
             left_out: plan.left_out(),
             load_seconds: Some(load_seconds),
             compile_seconds: Some(compile_seconds),
         }))?;
-        let stepper = Stepper::new(trainer, StepClock::new(&about, log.logged_seconds()));
+        let stepper = Stepper::new(trainer, StepClock::new(&metadata, log.logged_seconds()));
         let start = (stepper.steps(), stepper.seconds());
         let (saved, loss, is_empty) = (start, None, false);
         Ok(TrainingSession {
-            about,
+            metadata,
             test,
             folder,
             evaluation,
@@ -139,15 +139,15 @@ impl<'a> TrainingRun<'a> {
 impl TrainingSession<'_> {
     /// What its checkpoints say, at the first step of this session.
     #[must_use]
-    pub fn about(&self) -> &About {
-        &self.about
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
     }
 
     /// Trains until the budget is spent or `stop` is raised, and saves.
     ///
     /// # Errors
-    /// When the training leads nowhere any more, the device was lost, or a file cannot be written. The newest
-    /// checkpoint stays; the message tells its step.
+    /// When training diverges, the device was lost, or a file cannot be written. The newest
+    /// checkpoint stays; the message names its step.
     pub fn train(&mut self, stop: &AtomicBool, observer: &mut dyn Observer) -> Result<TrainingEnd> {
         while !self.stepper.is_over() && !stop.load(Ordering::Relaxed) {
             let step = self.stepper.steps();
@@ -175,7 +175,7 @@ impl TrainingSession<'_> {
         Ok(TrainingEnd { step, seconds, loss: self.loss, skipped, interrupted })
     }
 
-    /// Logs a block and tells of it.
+    /// Logs a block and reports it.
     fn record(&mut self, block: Block, observer: &mut dyn Observer) -> Result<()> {
         let (step, seconds, stats) = (self.stepper.steps(), self.stepper.seconds(), block.stats);
         let clock = self.stepper.clock();
@@ -229,16 +229,16 @@ impl TrainingSession<'_> {
         let state = self.stepper.trainer().state()?;
         let (step, rays, step_excess) = (state.step, state.rays, state.step_excess);
         let seconds = self.stepper.clock().recorded_seconds();
-        let about = About { step, rays, step_excess, seconds, ..self.about.clone() };
+        let metadata = Metadata { step, rays, step_excess, seconds, ..self.metadata.clone() };
         let path = self.folder.checkpoint();
-        let saved = Checkpoint { about, state }.save(&path);
+        let saved = Checkpoint { metadata, state }.save(&path);
         saved.with_context(|| format!("at step {step} ({})", self.kept()))?;
         self.saved = (step, self.stepper.seconds());
         observer.notice(&Event::Saved { step, path: &path });
         Ok(())
     }
 
-    /// What there is to go on with.
+    /// The state to resume from.
     fn kept(&self) -> String {
         match self.saved.0 {
             0 => "nothing was saved yet".to_owned(),

@@ -1,6 +1,6 @@
-//! Where the time of a training goes, from the device's timestamps.
+//! Where the time of a training run goes, from the device's timestamps.
 
-use super::log::Stage;
+use super::log::StageTime;
 use crate::gpu::Gpu;
 use crate::gpu::timer::Timer;
 
@@ -42,12 +42,13 @@ impl StageTimes {
 
     /// Each stage's time, the longest first; none when nothing was timed.
     #[must_use]
-    pub fn per_step(&self) -> Vec<Stage> {
+    pub fn per_step(&self) -> Vec<StageTime> {
         let timer = self.timer.as_ref().filter(|_| self.steps > 0);
         let per_step = 1e3 / f64::from(self.steps.max(1));
         let mut stages: Vec<_> = timer.iter().flat_map(|timer| timer.totals()).collect();
         stages.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-        let time = |(stage, seconds): (&String, &f64)| Stage { stage: stage.clone(), ms: seconds * per_step };
+        let time =
+            |(stage, seconds): (&String, &f64)| StageTime { stage: stage.clone(), ms: seconds * per_step };
         stages.into_iter().map(time).collect()
     }
 }

@@ -3,7 +3,7 @@
 use super::clock::StepClock;
 use super::stage_times::StageTimes;
 use crate::config::schedule::Budget;
-use crate::field::train::{StepStats, Trainer};
+use crate::field::trainer::{StepStats, Trainer};
 use anyhow::{Result, bail};
 use std::time::Instant;
 
@@ -32,7 +32,7 @@ pub struct Block {
 }
 
 impl Stepper {
-    /// A trainer at the time that `clock` tells.
+    /// A trainer at the time of `clock`.
     #[must_use]
     pub fn new(trainer: Trainer, clock: StepClock) -> Self {
         Self { stages: StageTimes::new(trainer.gpu()), trainer, clock, skipped: (0, 0) }
@@ -89,7 +89,7 @@ impl Stepper {
     /// Takes at least one and at most 16 steps, neither beyond the budget nor beyond `pause`, and waits.
     ///
     /// # Errors
-    /// When the training leads nowhere any more, or the device was lost.
+    /// When training diverges, or the device was lost.
     pub fn block(&mut self, pause: Budget) -> Result<Block> {
         let first = self.steps();
         let count = self.clock.steps_until(pause, first, BLOCK);
@@ -107,7 +107,7 @@ impl Stepper {
         Ok(Block { stats, seconds })
     }
 
-    /// Ends a run that leads nowhere any more.
+    /// Ends a run that diverges.
     fn check(&mut self, stats: &StepStats) -> Result<()> {
         let in_a_row = if stats.skipped == stats.steps { self.skipped.1 + stats.skipped } else { 0 };
         self.skipped = (self.skipped.0 + stats.skipped, in_a_row);
@@ -121,7 +121,7 @@ impl Stepper {
             _ => return Ok(()),
         };
         bail!(
-            "{found} at step {}: the training diverged; start again with a smaller optimizer.learning_rate ({} was \
+            "{found} at step {}: training diverged; start again with a smaller optimizer.learning_rate ({} was \
              used)",
             self.trainer.steps(),
             self.clock.first_learning_rate()

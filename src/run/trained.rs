@@ -2,10 +2,10 @@
 
 use crate::camera::LensKind;
 use crate::field::Field;
-use crate::field::checkpoint::{self, About, Checkpoint};
-use crate::field::render::Renderer;
+use crate::field::checkpoint::{self, Checkpoint, Metadata};
+use crate::field::renderer::Renderer;
 use crate::gpu::Gpu;
-use crate::photo::color::ColorSpace;
+use crate::photo::color_space::ColorSpace;
 use anyhow::Result;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -31,14 +31,14 @@ impl TrainedField {
 
     /// What the checkpoint says about itself.
     #[must_use]
-    pub fn about(&self) -> &About {
-        &self.checkpoint.about
+    pub fn metadata(&self) -> &Metadata {
+        &self.checkpoint.metadata
     }
 
     /// The colour space of what it renders.
     #[must_use]
     pub fn color_space(&self) -> ColorSpace {
-        ColorSpace::of(self.about().needs.hdr)
+        ColorSpace::of(self.metadata().features.hdr)
     }
 
     /// A renderer of the field for cameras with `lenses`.

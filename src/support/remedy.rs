@@ -77,9 +77,9 @@ impl fmt::Display for Remedy {
             }
             Self::SameReading { setting, then, now } => write!(
                 f,
-                "the training began with {setting} {then}, and now it is {now}; leave it as it was, or start anew"
+                "the run began with {setting} {then}, and now it is {now}; leave it as it was, or start anew"
             ),
-            Self::UsedFolder => f.write_str("name another one, go on with the training in it, or replace it"),
+            Self::UsedFolder => f.write_str("name another one, go on with the run in it, or replace it"),
             Self::RunFolder => f.write_str("the folder of a training run"),
         }
     }

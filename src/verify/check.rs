@@ -1,91 +1,94 @@
 //! Checks of the kernels on an adapter against the f64 reference.
 //!
 //! [`run`] does what `nerf check` does: every kernel, at ordinary, stiff and extreme inputs and odd sizes. Each check
-//! is a function of its own that returns [`Tally`]s, which the tests call too.
+//! is a function of its own that returns [`CheckResult`]s, which the tests call too.
 //!
-//! A [`Subject`] is the adapter with the variants to check. A [`Workbench`] is a small plan with all its buffers, and
+//! A [`CheckedAdapter`] is the adapter with the variants to check. A [`Workbench`] is a small plan with all its buffers, and
 //! knows what they look like: it puts batches on the device, runs stages and reads what they left. [`Setup`] says
-//! what it is built from, [`draw`] and [`hard_rays`] make its inputs.
+//! what it is built from, [`inputs`] and [`stress_rays`] make its inputs.
 
 pub mod activation;
 pub mod adam;
-pub mod draw;
+mod check_result;
+mod checked_adapter;
+mod device_parameters;
 pub mod exponential;
 pub mod fused;
 pub mod grid;
-pub mod hard_rays;
 pub mod harmonics;
+pub mod inputs;
 pub mod lens;
 pub mod loss;
 pub mod marching;
 pub mod networks;
 pub mod occupancy;
-mod parameters;
 mod probe;
 pub mod random;
 pub mod rays;
+pub mod rendered_view;
 pub mod selection;
 mod setup;
 pub mod step;
-mod subject;
-mod tally;
+pub mod stress_rays;
 pub mod thinned;
-pub mod view;
 mod workbench;
 
+pub use check_result::CheckResult;
+pub use checked_adapter::{CheckedAdapter, Forced};
 pub use setup::Setup;
-pub use subject::{Forced, Subject};
-pub use tally::Tally;
-pub use workbench::{Kept, Outcome, Workbench, visible_cells};
+pub use workbench::{KeptSample, PassOutput, Workbench, visible_cells};
 
 use anyhow::{Context, Result};
 
 /// A check: what it is of, and what runs it.
-struct Check {
+struct KernelCheck {
     name: &'static str,
-    run: fn(&Subject) -> Result<Vec<Tally>>,
+    run: fn(&CheckedAdapter) -> Result<Vec<CheckResult>>,
 }
 
 /// In the order of a training step.
-const CHECKS: [Check; 17] = [
-    Check { name: "exponentials", run: |subject| Ok(vec![exponential::exponentials(subject)?]) },
-    Check { name: "random numbers", run: |subject| Ok(vec![random::random_numbers(subject)?]) },
-    Check { name: "lenses", run: lens::lens_models },
-    Check { name: "rays of views", run: rays::view_rays },
-    Check { name: "rays of large views", run: rays::sharp_rays },
-    Check { name: "rays of a training", run: |subject| Ok(vec![rays::training_rays(subject)?]) },
-    Check { name: "marching", run: marching::marched_samples },
-    Check { name: "hash grid", run: |subject| Ok(vec![grid::features(subject)?]) },
-    Check { name: "selection", run: |subject| Ok(vec![selection::selected_samples(subject)?]) },
-    Check { name: "harmonics", run: |subject| Ok(vec![harmonics::harmonics(subject)?]) },
-    Check { name: "activations", run: |subject| Ok(vec![activation::activations(subject)?]) },
-    Check { name: "networks and scatter", run: |subject| networks::networks(subject, &networks::SHAPES) },
-    Check { name: "render, loss and gradient", run: compositing },
-    Check { name: "further terms of the loss", run: loss::further_terms },
-    Check { name: "Adam", run: adam::adam },
-    Check { name: "occupancy", run: |subject| Ok(vec![occupancy::occupancy_update(subject)?]) },
-    Check { name: "whole steps and views", run: whole },
+const CHECKS: [KernelCheck; 17] = [
+    KernelCheck { name: "exponentials", run: |adapter| Ok(vec![exponential::exponentials(adapter)?]) },
+    KernelCheck { name: "random numbers", run: |adapter| Ok(vec![random::random_numbers(adapter)?]) },
+    KernelCheck { name: "lenses", run: lens::lens_models },
+    KernelCheck { name: "rays of views", run: rays::view_rays },
+    KernelCheck { name: "rays of large views", run: rays::sharp_rays },
+    KernelCheck { name: "training rays", run: |adapter| Ok(vec![rays::training_rays(adapter)?]) },
+    KernelCheck { name: "marching", run: marching::marched_samples },
+    KernelCheck { name: "hash grid", run: |adapter| Ok(vec![grid::features(adapter)?]) },
+    KernelCheck { name: "selection", run: |adapter| Ok(vec![selection::selected_samples(adapter)?]) },
+    KernelCheck { name: "harmonics", run: |adapter| Ok(vec![harmonics::harmonics(adapter)?]) },
+    KernelCheck { name: "activations", run: |adapter| Ok(vec![activation::activations(adapter)?]) },
+    KernelCheck {
+        name: "networks and scatter",
+        run: |adapter| networks::networks(adapter, &networks::SHAPES),
+    },
+    KernelCheck { name: "render, loss and gradient", run: compositing },
+    KernelCheck { name: "further terms of the loss", run: loss::further_terms },
+    KernelCheck { name: "Adam", run: adam::adam },
+    KernelCheck { name: "occupancy", run: |adapter| Ok(vec![occupancy::occupancy_update(adapter)?]) },
+    KernelCheck { name: "whole steps and views", run: whole },
 ];
 
-fn compositing(subject: &Subject) -> Result<Vec<Tally>> {
-    Ok([fused::fused(subject)?, vec![thinned::thinned_rays(subject)?]].concat())
+fn compositing(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
+    Ok([fused::fused(adapter)?, vec![thinned::thinned_rays(adapter)?]].concat())
 }
 
-fn whole(subject: &Subject) -> Result<Vec<Tally>> {
+fn whole(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
     let setups = step::setups();
-    let step = step::one_step(subject, &setups[2..])?;
-    Ok([vec![step], view::rendered_views(subject)?].concat())
+    let step = step::one_step(adapter, &setups[2..])?;
+    Ok([vec![step], rendered_view::rendered_views(adapter)?].concat())
 }
 
-/// Runs every check; `progress` is told how many are done, how many there are, and which one is next.
+/// Runs every check; `progress` gets how many are done, how many there are, and which one is next.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel; the message names the check.
-pub fn run(subject: &Subject, progress: &dyn Fn(usize, usize, &str)) -> Result<Vec<Tally>> {
-    let mut tallies = Vec::new();
+pub fn run(adapter: &CheckedAdapter, progress: &dyn Fn(usize, usize, &str)) -> Result<Vec<CheckResult>> {
+    let mut results = Vec::new();
     for (done, check) in CHECKS.iter().enumerate() {
         progress(done, CHECKS.len(), check.name);
-        tallies.extend((check.run)(subject).with_context(|| format!("checking {}", check.name))?);
+        results.extend((check.run)(adapter).with_context(|| format!("checking {}", check.name))?);
     }
-    Ok(tallies)
+    Ok(results)
 }

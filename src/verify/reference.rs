@@ -27,17 +27,6 @@ pub mod selection;
 pub mod step;
 pub mod vectors;
 
-/// Which optical depths the transmittance `T_i` of a sample sums up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Transmittance {
-    /// `T_i = exp(−Σ_{j<i} τ_j)`, the light that reaches the sample (Mildenhall et al. 2020, eq. 3).
-    #[default]
-    Exclusive,
-    /// `T_i = exp(−Σ_{j≤i} τ_j)`, the light that leaves the sample, as Perlman 2023 prints it.
-    Inclusive,
-}
-
 /// The colours that a field predicts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -16,7 +16,7 @@ mod toys;
 mod world;
 
 use crate::camera::LensKind;
-use crate::photo::color::srgb_from_linear;
+use crate::photo::color_space::srgb_from_linear;
 use anyhow::{Result, bail};
 use fog::Fog;
 use glam::{DVec3, dvec3};
@@ -140,7 +140,7 @@ impl Scene {
 
 /// Numbers of views per split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Views {
+pub struct ViewCounts {
     /// Views to train on.
     pub train: usize,
     /// Views to choose settings by.
@@ -149,7 +149,7 @@ pub struct Views {
     pub test: usize,
 }
 
-impl Views {
+impl ViewCounts {
     /// `total` views: an eighth to test, a sixteenth to validate (at least one each), the rest to train.
     ///
     /// # Errors
@@ -170,11 +170,11 @@ impl Views {
 
 /// What to generate.
 #[derive(Clone, Debug)]
-pub struct Generate {
+pub struct SceneOptions {
     /// Name of the scene.
     pub scene: String,
     /// Views per split.
-    pub views: Views,
+    pub views: ViewCounts,
     /// Width and height of the images, in pixels.
     pub size: (u32, u32),
     /// Linear EXR with values above 1, instead of 8-bit PNG.
@@ -187,10 +187,10 @@ pub struct Generate {
     pub seed: u64,
 }
 
-impl Generate {
+impl SceneOptions {
     /// `scene` with 100 views of 200×200 pixels and 4×4 sub-rays.
     pub fn new(scene: &str) -> Self {
-        let views = Views { train: 82, val: 6, test: 12 };
+        let views = ViewCounts { train: 82, val: 6, test: 12 };
         let (scene, lenses) = (scene.to_owned(), vec![LensKind::Pinhole]);
         Self { scene, views, size: (200, 200), hdr: false, lenses, samples: 4, seed: 0 }
     }
@@ -231,7 +231,7 @@ pub struct Summary {
 ///
 /// # Errors
 /// If the options do not fit the scene, the folder is in use, or a file cannot be written.
-pub fn generate(options: &Generate, out: &Path, progress: &(dyn Fn(usize) + Sync)) -> Result<Summary> {
+pub fn generate(options: &SceneOptions, out: &Path, progress: &(dyn Fn(usize) + Sync)) -> Result<Summary> {
     let scene = Scene::named(&options.scene)?;
     options.check()?;
     files::write(&scene, options, out, progress)

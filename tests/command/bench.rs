@@ -93,7 +93,7 @@ fn training_is_measured_over_time() {
 }
 
 #[test]
-fn trainings_that_cannot_be_compared_are_refused_at_once() {
+fn runs_that_cannot_be_compared_are_refused_at_once() {
     let here = place("refused");
     let (toys, out) = (here.join("toys"), here.join("out"));
     quietly(&["generate", "toys", "--views", "4", "--size", "8", "--samples", "1", "--out", text(&toys)])

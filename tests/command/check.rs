@@ -3,9 +3,9 @@
 use crate::program::{answer, nerf};
 use crate::support::folder;
 use assert_cmd::Command;
-use nerf::verify::check::draw::Random;
-use nerf::verify::check::hard_rays::HardRay;
-use nerf::verify::reference::Transmittance;
+use nerf::config::Transmittance;
+use nerf::verify::check::inputs::Random;
+use nerf::verify::check::stress_rays::StressRay;
 use nerf::verify::reference::vectors::{GoldenFile, NOT_FINITE};
 use predicates::prelude::*;
 use predicates::str::contains;
@@ -23,10 +23,10 @@ fn check(args: &[&str]) -> Command {
     command
 }
 
-/// A file of a few hard rays, changed by `change`.
+/// A file of a few stress rays, changed by `change`.
 fn vectors(folder: &TempDir, change: impl FnOnce(&mut Value)) -> String {
-    let rays = HardRay::many(&mut Random::new(7), 60, 33);
-    let file: GoldenFile = HardRay::golden(Transmittance::Inclusive, 1000, &rays);
+    let rays = StressRay::many(&mut Random::new(7), 60, 33);
+    let file: GoldenFile = StressRay::golden(Transmittance::Inclusive, 1000, &rays);
     let mut value = serde_json::to_value(&file).expect("numbers");
     change(&mut value);
     let path: PathBuf = folder.path().join("rays.json");

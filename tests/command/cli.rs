@@ -1,4 +1,4 @@
-//! The command line: exit codes, and one clear message for what can go wrong before any training.
+//! The command line: exit codes, and one clear message for what can go wrong before training.
 
 use crate::program::{answer, nerf};
 use crate::support::folder;

@@ -1,4 +1,4 @@
-//! Driving the program from end to end: places for what it writes, datasets, trainings and what they say.
+//! Driving the program from end to end: places for what it writes, datasets, training runs and what they say.
 
 use assert_cmd::Command;
 use nerf::field::checkpoint::Checkpoint;
@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-/// The preset of trainings that take seconds.
+/// The preset of training runs that take seconds.
 pub(crate) const SMOKE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/smoke.json");
 
 pub(crate) fn nerf() -> Command {

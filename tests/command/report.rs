@@ -1,4 +1,4 @@
-//! The page about a training: how logs are read, what the page shows, and that it needs nothing but itself.
+//! The page about a training run: how logs are read, what the page shows, and that it needs nothing but itself.
 
 mod browser;
 mod command;
@@ -7,11 +7,11 @@ use crate::support::folder;
 use glam::{DAffine3, DVec2, DVec3};
 use nerf::camera::{Camera, Lens};
 use nerf::capture::dataset::spread_order;
-use nerf::field::render::View;
+use nerf::field::renderer::View;
 use nerf::run::depths::{Depths, Onlookers};
 use nerf::run::log::Log;
 use nerf::run::report::pictures::{LONGEST_SIDE, Pair, Pictures};
-use nerf::run::report::views::{Outcome, TestViews, ViewScores};
+use nerf::run::report::test_views::{ScoreSummary, TestViews, ViewScores};
 use nerf::run::report::{Facts, Report};
 
 /// A log with every kind of row, and a torn last line.
@@ -242,7 +242,7 @@ fn every_odd_log_gives_a_page() {
         ("{\"step\": 1", "1 line of the log"),
         ("{\"event\":\"start\"}", "There is no log of steps"),
         ("{\"step\":16}", "the dataset &lt;b&gt;moved"),
-        ("{\"step\":16,\"seconds\":1e308,\"loss\":-1,\"psnr\":0,\"samples\":0}", "Course"),
+        ("{\"step\":16,\"seconds\":1e308,\"loss\":-1,\"psnr\":0,\"samples\":0}", "Training curves"),
         ("{\"step\":16,\"seconds\":0,\"eval_psnr\":null}", "no log of steps"),
         ("{\"event\":\"stages\",\"stages\":[{}]}", "0 timed steps"),
         ("{\"event\":\"stages\"}", "no log of steps"),
@@ -264,10 +264,10 @@ fn every_odd_log_gives_a_page() {
 #[test]
 fn an_older_evaluation_is_not_the_result() {
     let mut report = report(FULL, Err(String::new()));
-    let logged = Outcome { psnr: 21.25, ssim: 0.75, views: 9, left_out: 0, near_share: None };
-    assert_eq!(report.outcome(), Some(logged));
+    let logged = ScoreSummary { psnr: 21.25, ssim: 0.75, views: 9, left_out: 0, near_share: None };
+    assert_eq!(report.summary(), Some(logged));
     report.facts.steps = Some(64);
-    assert_eq!(report.outcome(), None, "trained further since");
+    assert_eq!(report.summary(), None, "trained further since");
     report.facts.is_done = Some(false);
     assert!(page(&report).contains("interrupted before its end"));
 }

@@ -1,4 +1,4 @@
-//! Trainings from end to end with everything that a photo may bring: masks, depth, alpha, 16 bits, linear light,
+//! Training runs from end to end with everything that a photo may bring: masks, depth, alpha, 16 bits, linear light,
 //! a size of its own and an odd lens.
 
 mod alpha;
@@ -9,7 +9,7 @@ mod reading;
 
 use crate::program::{SMOKE, checkpoint, generated, nerf, number, place, quietly, text, train};
 use crate::support::files;
-use nerf::capture::image::{ExrPixels, Precision, read_exr_channel, write_exr, write_png_rgba8};
+use nerf::capture::image_file::{ExrPixels, Precision, read_exr_channel, write_exr, write_png_rgba8};
 use nerf::photo::{Image, Pixels};
 use serde_json::{Value, json};
 use std::fs;
@@ -27,7 +27,7 @@ static TOYS: LazyLock<PathBuf> = LazyLock::new(|| generated("toys", "toys", &SMA
 /// Steps after which differences show.
 const STEPS: [&str; 2] = ["--steps", "300"];
 
-/// A training on [`TOYS`] as they are, and its PSNR.
+/// A training run on [`TOYS`] as they are, and its PSNR.
 static PLAIN: LazyLock<(PathBuf, f64)> = LazyLock::new(|| {
     let run = place("plain_run");
     let psnr = number(&train(&TOYS, &run, &STEPS)["psnr"]);
@@ -109,19 +109,19 @@ fn edit_frames(dataset: &Path, keys: impl Fn(&str) -> Vec<(&'static str, Value)>
     }
 }
 
-/// What a training says on stderr, and whether it succeeds.
+/// What a training run says on stderr, and whether it succeeds.
 fn remarks(dataset: &Path, run: &Path, further: &[&str]) -> (bool, String) {
     let args = ["train", text(dataset), "--out", text(run), "--config", SMOKE];
     let output = nerf().args(args).args(further).output().expect("starts");
     (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// Whether two trainings have ended in the same field, bit for bit.
+/// Whether two training runs have ended in the same field, bit for bit.
 fn are_equal(one: &Path, other: &Path) -> bool {
     checkpoint(one).state == checkpoint(other).state
 }
 
-/// A short training of which every bit is decided.
+/// A short training run of which every bit is decided.
 const DECIDED: [&str; 4] = ["--deterministic", "--no-eval", "--steps", "40"];
 
 /// OpenEXR renderings of the test views.

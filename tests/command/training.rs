@@ -3,10 +3,10 @@
 use crate::program::{SMOKE, checkpoint, generated, number, object, place, quietly, rows, text, train};
 use nerf::camera::LensKind;
 use nerf::capture::dataset::{Dataset, OpenOptions};
-use nerf::capture::image::read_exr_channel;
+use nerf::capture::image_file::read_exr_channel;
 use nerf::config::Config;
 use nerf::config::schedule::Budget;
-use nerf::field::train::Trainer;
+use nerf::field::trainer::Trainer;
 use nerf::gpu::{Gpu, adapter};
 use nerf::run::{
     EvaluationAtEnd, EvaluationOptions, Event, NoTestViews, Observer, Resolved, RunFolder, TrainOptions,
@@ -158,7 +158,7 @@ fn an_interrupted_training_goes_on() {
     let signalled = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(signalled.expect("kill runs").success());
     assert_eq!(child.wait().expect("ends").code(), Some(0), "interrupting is no failure");
-    let step = checkpoint(&parts).about.step;
+    let step = checkpoint(&parts).metadata.step;
     assert!((16..300).contains(&step), "interrupted at {step}");
     train(&TOYS, &parts, &["--no-eval", "--resume"]);
     same_field(&whole, &parts);
@@ -168,7 +168,7 @@ fn an_interrupted_training_goes_on() {
 fn same_field(one: &Path, other: &Path) {
     let (one, other) = (checkpoint(one), checkpoint(other));
     assert_eq!(one.state.step, other.state.step);
-    if one.about.adapter.contains("llvmpipe") {
+    if one.metadata.adapter.contains("llvmpipe") {
         assert!(one.state == other.state, "the fields differ");
     }
     let sum = |table: &[f32]| table.iter().map(|&value| f64::from(value).abs()).sum::<f64>();
@@ -184,7 +184,7 @@ fn held_out_views_stay_held_out() {
         fs::remove_file(dataset.join(format!("transforms_{split}.json"))).expect("removed");
     }
     train(&dataset, &run, &["--steps", "20", "--hold-out", "4", "--background", "random"]);
-    let splits = checkpoint(&run).about.splits;
+    let splits = checkpoint(&run).metadata.splits;
     assert_eq!(splits.test, ["./train/0000", "./train/0004", "./train/0008"]);
     assert!(splits.test.iter().all(|name| !splits.train.contains(name)));
     let eval = object(&["eval", text(&run), text(&dataset), "--background", "white"]);
@@ -211,9 +211,12 @@ fn every_kind_of_scene_trains() {
         let (run, out) = (place(&format!("{scene}_run")), place(&format!("{scene}_views")));
         let result = train(&dataset, &run, &["--steps", "24"]);
         assert!(number(&result["psnr"]) > 4.0, "{scene}: {result}");
-        let about = checkpoint(&run).about;
-        assert_eq!(about.needs.lenses, lenses.into_iter().collect());
-        assert_eq!((about.needs.hdr, about.bounds.cascades > 1), (scene == "fog", scene == "courtyard"));
+        let metadata = checkpoint(&run).metadata;
+        assert_eq!(metadata.features.lenses, lenses.into_iter().collect());
+        assert_eq!(
+            (metadata.features.hdr, metadata.bounds.cascades > 1),
+            (scene == "fog", scene == "courtyard")
+        );
         let cameras = dataset.join("transforms_test.json");
         let args = ["render", text(&run), "--out", text(&out), "--cameras", text(&cameras)];
         quietly(&[&args[..], &["--format", "png", "--format", "exr", "--background", "white"]].concat())
@@ -264,7 +267,7 @@ fn far_too_high_learning_rates() {
 /// In any number of threads, and with the clock at another time. A software driver's threads are counted by
 /// `LP_NUM_THREADS`.
 #[test]
-fn deterministic_trainings_are_equal_bit_for_bit() {
+fn deterministic_runs_are_equal_bit_for_bit() {
     for accumulation in ["auto", "fixed"] {
         let set = format!("accumulation={accumulation}");
         let bytes = |threads: &str, steps: &[&str]| {
@@ -381,8 +384,8 @@ fn a_trainer_on_a_dataset_takes_its_photos_as_they_are() {
         let mut config = Config::for_dataset(&dataset, gpu.is_cpu()).expect("a preset");
         config.merge_file(Path::new(SMOKE)).expect("settings");
         let mut trainer = Trainer::on(&gpu, &dataset, config).expect("a trainer");
-        let needs = &trainer.plan().needs;
-        assert_eq!((needs.hdr, needs.grey != 1.0), (dataset.is_hdr, dataset.is_hdr), "{needs:?}");
+        let features = &trainer.plan().features;
+        assert_eq!((features.hdr, features.grey != 1.0), (dataset.is_hdr, dataset.is_hdr), "{features:?}");
         trainer.step(1e-2, None).expect("a step");
         assert!(trainer.report().expect("a report").loss.is_finite());
     }

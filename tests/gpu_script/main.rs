@@ -174,7 +174,7 @@ fn errors_are_not_taken_for_wrong_kernels_or_results() {
         (
             "DIVERGED",
             "train_lego_12s",
-            "| train_lego_12s | failed | error: the training has no PSNR: it diverged |",
+            "| train_lego_12s | failed | error: the run has no PSNR: it diverged |",
         ),
         ("BROKEN", "train_lego_12s", "| train_lego_12s | failed | the device was lost |"),
         ("BROKEN", "exchange", "| check_exchange | failed | the device was lost |"),

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Stands in for nerf in the tests of scripts/gpu.sh: answers at once, in the same words. WRONG names a path whose kernels
-# are wrong, BROKEN a path or a training that ends with an error.
+# are wrong, BROKEN a path or a training run that ends with an error.
 out=
 for ((i = 1; i <= $#; i++)); do
     next=$((i + 1))

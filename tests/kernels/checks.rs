@@ -4,133 +4,134 @@
 use anyhow::Result;
 use nerf::config::Accumulation;
 use nerf::field::layer::Product;
-use nerf::gpu::tensor::Memory;
-use nerf::verify::check::networks::{SHAPES, Shape, networks};
+use nerf::gpu::tensor::TensorMemory;
+use nerf::verify::check::networks::{FieldShape, SHAPES, networks};
 use nerf::verify::check::{
     Forced, activation, adam, exponential, fused, grid, harmonics, lens, loss, marching, occupancy, random,
-    rays, selection, step, thinned, view,
+    rays, rendered_view, selection, step, thinned,
 };
 
-use crate::bench::{modest_subject, passes, subject, subject_with};
+use crate::bench::{adapter, adapter_with, modest_adapter, passes};
 
 #[test]
 fn exponentials() -> Result<()> {
-    passes([exponential::exponentials(&subject()?)?]);
+    passes([exponential::exponentials(&adapter()?)?]);
     Ok(())
 }
 
 #[test]
 fn random_numbers() -> Result<()> {
-    passes([random::random_numbers(&subject()?)?]);
+    passes([random::random_numbers(&adapter()?)?]);
     Ok(())
 }
 
 #[test]
 fn lens_models() -> Result<()> {
-    passes(lens::lens_models(&subject()?)?);
+    passes(lens::lens_models(&adapter()?)?);
     Ok(())
 }
 
 #[test]
 fn view_rays() -> Result<()> {
-    passes(rays::view_rays(&subject()?)?);
+    passes(rays::view_rays(&adapter()?)?);
     Ok(())
 }
 
 #[test]
 fn sharp_rays() -> Result<()> {
-    passes(rays::sharp_rays(&subject()?)?);
+    passes(rays::sharp_rays(&adapter()?)?);
     Ok(())
 }
 
 #[test]
 fn training_rays() -> Result<()> {
-    passes([rays::training_rays(&subject()?)?]);
+    passes([rays::training_rays(&adapter()?)?]);
     Ok(())
 }
 
 #[test]
 fn marched_samples() -> Result<()> {
-    passes(marching::marched_samples(&subject()?)?);
+    passes(marching::marched_samples(&adapter()?)?);
     Ok(())
 }
 
 #[test]
 fn grid_features() -> Result<()> {
-    passes([grid::features(&subject()?)?]);
+    passes([grid::features(&adapter()?)?]);
     Ok(())
 }
 
 #[test]
 fn selected_samples() -> Result<()> {
-    passes([selection::selected_samples(&subject()?)?]);
+    passes([selection::selected_samples(&adapter()?)?]);
     Ok(())
 }
 
 #[test]
 fn harmonics_of_directions() -> Result<()> {
-    passes([harmonics::harmonics(&subject()?)?]);
+    passes([harmonics::harmonics(&adapter()?)?]);
     Ok(())
 }
 
 #[test]
 fn activations() -> Result<()> {
-    passes([activation::activations(&subject()?)?]);
+    passes([activation::activations(&adapter()?)?]);
     Ok(())
 }
 
 #[test]
 fn networks_and_scatter() -> Result<()> {
-    passes(networks(&subject()?, &SHAPES)?);
+    passes(networks(&adapter()?, &SHAPES)?);
     Ok(())
 }
 
 #[test]
 fn networks_of_further_shapes() -> Result<()> {
-    let shape = |width, color_layers, hdr| Shape { levels: 8, width, color_layers, hdr, saturated: false };
-    passes(networks(&subject()?, &[shape(16, 3, true), shape(32, 3, false), shape(64, 1, true)])?);
+    let shape =
+        |width, color_layers, hdr| FieldShape { levels: 8, width, color_layers, hdr, saturated: false };
+    passes(networks(&adapter()?, &[shape(16, 3, true), shape(32, 3, false), shape(64, 1, true)])?);
     Ok(())
 }
 
 #[test]
 fn render_loss_and_gradient() -> Result<()> {
-    passes(fused::fused(&subject()?)?);
-    passes(vec![thinned::thinned_rays(&subject()?)?]);
+    passes(fused::fused(&adapter()?)?);
+    passes(vec![thinned::thinned_rays(&adapter()?)?]);
     Ok(())
 }
 
 #[test]
 fn adam_on_table_and_networks() -> Result<()> {
-    passes(adam::adam(&subject()?)?);
+    passes(adam::adam(&adapter()?)?);
     Ok(())
 }
 
 #[test]
 fn further_terms_of_the_loss() -> Result<()> {
-    passes(loss::further_terms(&subject()?)?);
+    passes(loss::further_terms(&adapter()?)?);
     Ok(())
 }
 
 #[test]
 fn occupancy_update() -> Result<()> {
-    passes([occupancy::occupancy_update(&subject()?)?]);
+    passes([occupancy::occupancy_update(&adapter()?)?]);
     Ok(())
 }
 
 #[test]
 fn one_step() -> Result<()> {
-    passes([step::one_step(&subject()?, &step::setups())?]);
+    passes([step::one_step(&adapter()?, &step::setups())?]);
     Ok(())
 }
 
 #[test]
 fn rendered_views() -> Result<()> {
-    passes(view::rendered_views(&subject()?)?);
+    passes(rendered_view::rendered_views(&adapter()?)?);
     Ok(())
 }
 
 /// A field that is quick to build, in every variant.
-const SMALL: &[Shape] = SHAPES.split_at(1).0;
+const SMALL: &[FieldShape] = SHAPES.split_at(1).0;
 
 /// The checks whose kernels an accumulation changes.
 #[test]
@@ -139,17 +140,17 @@ fn every_accumulation() -> Result<()> {
         [Accumulation::Ordered, Accumulation::Fixed, Accumulation::Float, Accumulation::Exchange]
     {
         let forced = Forced { accumulation: Some(accumulation), ..Forced::default() };
-        let subject = match subject_with(forced) {
-            Ok(subject) => subject,
+        let adapter = match adapter_with(forced) {
+            Ok(adapter) => adapter,
             Err(error) if accumulation == Accumulation::Float => {
                 println!("left out: {error:#}");
                 continue;
             }
             Err(error) => return Err(error),
         };
-        println!("{}", subject.describe()?);
-        passes(networks(&subject, SMALL)?);
-        passes(adam::adam(&subject)?);
+        println!("{}", adapter.describe()?);
+        passes(networks(&adapter, SMALL)?);
+        passes(adam::adam(&adapter)?);
     }
     Ok(())
 }
@@ -159,16 +160,16 @@ fn every_accumulation() -> Result<()> {
 fn every_product() -> Result<()> {
     for (rows, shared_weights) in [(1, false), (2, false), (4, false), (4, true)] {
         let forced = Forced { product: Some(Product { rows, shared_weights }), ..Forced::default() };
-        let subject = match subject_with(forced) {
-            Ok(subject) => subject,
+        let adapter = match adapter_with(forced) {
+            Ok(adapter) => adapter,
             Err(error) if shared_weights => {
                 println!("left out: {error:#}");
                 continue;
             }
             Err(error) => return Err(error),
         };
-        println!("{}", subject.describe()?);
-        passes(networks(&subject, SMALL)?);
+        println!("{}", adapter.describe()?);
+        passes(networks(&adapter, SMALL)?);
     }
     Ok(())
 }
@@ -176,32 +177,32 @@ fn every_product() -> Result<()> {
 /// Every check, with tensors in buffers whatever suits this adapter best.
 #[test]
 fn tensors_in_buffers() -> Result<()> {
-    let subject = subject_with(Forced { memory: Some(Memory::Buffers), ..Forced::default() })?;
-    passes(marching::marched_samples(&subject)?);
+    let adapter = adapter_with(Forced { memory: Some(TensorMemory::Buffers), ..Forced::default() })?;
+    passes(marching::marched_samples(&adapter)?);
     passes([
-        grid::features(&subject)?,
-        selection::selected_samples(&subject)?,
-        harmonics::harmonics(&subject)?,
+        grid::features(&adapter)?,
+        selection::selected_samples(&adapter)?,
+        harmonics::harmonics(&adapter)?,
     ]);
-    passes(networks(&subject, SMALL)?);
-    passes(fused::fused(&subject)?);
-    passes(vec![thinned::thinned_rays(&subject)?]);
-    passes(adam::adam(&subject)?);
-    passes([occupancy::occupancy_update(&subject)?]);
-    passes(view::rendered_views(&subject)?);
-    passes([rays::training_rays(&subject)?]);
-    passes(loss::further_terms(&subject)?);
+    passes(networks(&adapter, SMALL)?);
+    passes(fused::fused(&adapter)?);
+    passes(vec![thinned::thinned_rays(&adapter)?]);
+    passes(adam::adam(&adapter)?);
+    passes([occupancy::occupancy_update(&adapter)?]);
+    passes(rendered_view::rendered_views(&adapter)?);
+    passes([rays::training_rays(&adapter)?]);
+    passes(loss::further_terms(&adapter)?);
     let setups = step::setups();
-    passes([step::one_step(&subject, &[setups[0].clone(), setups[4].clone()])?]);
+    passes([step::one_step(&adapter, &[setups[0].clone(), setups[4].clone()])?]);
     Ok(())
 }
 
 /// Browsers and modest GPUs have eight storage buffers, 128 MiB of each, and none of the features that others have.
 #[test]
 fn what_webgpu_guarantees_is_enough() -> Result<()> {
-    let subject = modest_subject()?;
-    passes([rays::training_rays(&subject)?, step::one_step(&subject, &step::setups())?]);
-    passes(loss::further_terms(&subject)?);
-    passes(view::rendered_views(&subject)?);
+    let adapter = modest_adapter()?;
+    passes([rays::training_rays(&adapter)?, step::one_step(&adapter, &step::setups())?]);
+    passes(loss::further_terms(&adapter)?);
+    passes(rendered_view::rendered_views(&adapter)?);
     Ok(())
 }

@@ -4,11 +4,11 @@ use anyhow::Result;
 use glam::DVec3;
 use nerf::config::Accumulation;
 use nerf::field::density;
-use nerf::verify::check::draw::{Random, random_batch};
 use nerf::verify::check::grid::encode;
+use nerf::verify::check::inputs::{Random, random_batch};
 use nerf::verify::check::{Forced, Setup};
 
-use crate::bench::{subject_with, workbench};
+use crate::bench::{adapter_with, workbench};
 
 /// One sample in the middle of a cell of a dense level: the mean of eight entries.
 #[test]
@@ -31,8 +31,8 @@ fn one_feature_by_hand() -> Result<()> {
 #[test]
 fn sums_are_the_same_every_time() -> Result<()> {
     for accumulation in [Accumulation::Fixed, Accumulation::Ordered] {
-        let subject = subject_with(Forced { accumulation: Some(accumulation), ..Forced::default() })?;
-        let bench = subject.workbench(Setup::tiny())?;
+        let adapter = adapter_with(Forced { accumulation: Some(accumulation), ..Forced::default() })?;
+        let bench = adapter.workbench(Setup::tiny())?;
         let mut random = Random::new(13);
         bench.randomise(&mut random, 1.0, 1.0)?;
         let stages = bench.stages()?;

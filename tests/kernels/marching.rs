@@ -5,7 +5,7 @@ use nerf::field::march::SPARE_ROWS;
 use nerf::verify::check::Setup;
 use nerf::verify::check::marching::Marching;
 
-use crate::bench::subject;
+use crate::bench::adapter;
 
 /// A full occupancy grid.
 fn full(marching: &Marching) -> Vec<u32> {
@@ -15,7 +15,7 @@ fn full(marching: &Marching) -> Vec<u32> {
 /// No ray at all: nothing is marched and nothing breaks.
 #[test]
 fn no_rays() -> Result<()> {
-    let marching = Marching::new(&subject()?, Setup::tiny())?;
+    let marching = Marching::new(&adapter()?, Setup::tiny())?;
     marching.run(&full(&marching), 0, true)?;
     let counters = marching.bench.counters()?;
     assert_eq!((counters.rays_used, counters.samples, counters.samples_wanted), (0, 0, 0));
@@ -28,7 +28,7 @@ fn too_many_samples() -> Result<()> {
     let marching = |samples| {
         let mut setup = Setup::tiny();
         setup.config.batch.samples = samples;
-        Marching::new(&subject()?, setup)
+        Marching::new(&adapter()?, setup)
     };
     let (count, capacity) = (250, 512);
     let [small, large] = [marching(capacity)?, marching(16384)?];

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use glam::{DAffine3, DVec2, DVec3};
 use nerf::camera::{Camera, Lens, LensKind};
-use nerf::field::render::Renderer;
+use nerf::field::renderer::Renderer;
 use nerf::field::viewing;
 use nerf::verify::check::Setup;
 use nerf::verify::check::rays::{DeviceRay, begin_rays, pixel_camera};
@@ -36,7 +36,7 @@ fn lenses_that_were_left_out_are_refused() -> Result<()> {
 #[test]
 fn rays_along_the_axes() -> Result<()> {
     let mut bench = workbench(Setup::tiny())?;
-    bench.workspace.allocate(&bench.gpu, &viewing::demands(&bench.plan))?;
+    bench.workspace.allocate(&bench.gpu, &viewing::buffers(&bench.plan))?;
     let stage = viewing::rays(&bench.gpu, &bench.plan, &bench.workspace)?;
     let near = bench.plan.config.march.near;
     for (origin, back, want) in [

@@ -2,10 +2,10 @@
 
 use anyhow::Result;
 use nerf::verify::check::Setup;
-use nerf::verify::check::draw::{Random, random_batch};
+use nerf::verify::check::inputs::{Random, random_batch};
 use nerf::verify::check::selection::Selecting;
 
-use crate::bench::subject;
+use crate::bench::adapter;
 
 /// The rays that do not fit are left out, from the first of them on.
 #[test]
@@ -13,7 +13,7 @@ fn too_many_kept_samples() -> Result<()> {
     let mut setup = Setup::tiny();
     setup.config.march.most_steps = 32;
     setup.config.batch.kept = 60;
-    let selecting = Selecting::new(&subject()?, setup)?;
+    let selecting = Selecting::new(&adapter()?, setup)?;
     let bench = &selecting.bench;
     let capacity = bench.plan.capacity.kept;
     let mut random = Random::new(32);

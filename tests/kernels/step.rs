@@ -1,17 +1,17 @@
-//! Trainings of a tiny field over many steps.
+//! Training runs of a tiny field over many steps.
 
 use anyhow::Result;
 use nerf::verify::check::Setup;
 use nerf::verify::check::step::{LEARNING_RATE, TinyTraining, setups};
 
-use crate::bench::subject;
+use crate::bench::adapter;
 use crate::close::assert_close;
 
 /// Both train on the samples that the device chose; the losses stay together while Adam amplifies rounding.
 #[test]
 fn twenty_losses_agree_with_the_reference() -> Result<()> {
     for (name, setup) in setups() {
-        let mut tiny = TinyTraining::new(&subject()?, setup)?;
+        let mut tiny = TinyTraining::new(&adapter()?, setup)?;
         let mut reference = tiny.reference()?;
         let (mut got, mut want) = (Vec::new(), Vec::new());
         for _ in 0..20 {
@@ -30,7 +30,7 @@ fn twenty_losses_agree_with_the_reference() -> Result<()> {
 /// Starting over, and going on from a state, repeat the same steps.
 #[test]
 fn states_are_restored() -> Result<()> {
-    let mut tiny = TinyTraining::new(&subject()?, Setup::tiny())?;
+    let mut tiny = TinyTraining::new(&adapter()?, Setup::tiny())?;
     tiny.trainer.warm_up()?;
     let losses = |tiny: &mut TinyTraining, steps: usize| -> Result<Vec<f64>> {
         (0..steps).map(|_| Ok(tiny.step()?.0.loss)).collect()

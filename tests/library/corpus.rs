@@ -131,7 +131,13 @@ fn assert_close(what: &str, got: &[f64], expected: &[f64], tolerance: f64) {
     }
 }
 
-fn check_frame(name: &str, entry: &nerf::capture::dataset::Entry, frame: &Value, file: &Value, third: f64) {
+fn check_frame(
+    name: &str,
+    entry: &nerf::capture::dataset::FrameEntry,
+    frame: &Value,
+    file: &Value,
+    third: f64,
+) {
     let layers = layers(frame, file);
     let declared = first(&layers, "w").zip(first(&layers, "h"));
     let doubled =

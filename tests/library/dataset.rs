@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::support::{folder, shared};
 use nerf::camera::Lens;
 use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions, read_cameras};
-use nerf::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use nerf::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::photo::AlphaMode;
 
 fn open(path: &Path) -> Dataset {

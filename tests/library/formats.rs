@@ -8,7 +8,7 @@ use exr::prelude::{
     LayerAttributes, LineOrder, Vec2, WritableImage, f16,
 };
 use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageBuffer, ImageFormat, Rgb, Rgba};
-use nerf::capture::image::{Header, MOST_PIXELS, load_depth};
+use nerf::capture::image_file::{Header, MOST_PIXELS, load_depth};
 use nerf::photo::{BitDepth, Image, Pixels};
 use proptest::prelude::*;
 

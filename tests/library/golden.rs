@@ -5,7 +5,7 @@ mod textbook;
 
 use std::path::Path;
 
-use nerf::verify::reference::Transmittance;
+use nerf::config::Transmittance;
 use nerf::verify::reference::composite::composite;
 use nerf::verify::reference::vectors::{Expected, GoldenFile, NOT_FINITE, RayError};
 use textbook::{Precision, textbook_d_s};

@@ -1,5 +1,5 @@
 //! The library from within, without starting its program: the reference, datasets, pictures, scenes, presets, charts,
-//! how kernels are linked, and trainings that must not break.
+//! how kernels are linked, and training runs that must not break.
 
 mod architecture;
 mod chart;

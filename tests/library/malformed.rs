@@ -7,7 +7,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 use crate::support::files;
-use nerf::capture::dataset::{Severity, transforms};
+use nerf::capture::dataset::transforms;
+use nerf::capture::diagnostics::Severity;
 
 /// What is said about one file, a line per remark.
 fn remarks(name: &str, bytes: &[u8]) -> String {
@@ -17,6 +18,7 @@ fn remarks(name: &str, bytes: &[u8]) -> String {
             let severity = |severity| match severity {
                 Severity::Note => "note",
                 Severity::Warning => "warning",
+                Severity::Error => "error",
             };
             let notes = listing.notes();
             notes.iter().map(|note| format!("{}: {note}", severity(note.severity))).collect()

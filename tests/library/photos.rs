@@ -1,4 +1,4 @@
-//! Photos as a training gets them: masks, alpha, depth, orientation, crops and sizes.
+//! Photos as training gets them: masks, alpha, depth, orientation, crops and sizes.
 
 mod alpha;
 mod depth;
@@ -12,7 +12,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage, ImageBuffer, ImageEncoder, ImageFormat, Luma, Rgb};
 use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions};
-use nerf::capture::image::write_png_rgba8;
+use nerf::capture::image_file::write_png_rgba8;
 use nerf::photo::{BitDepth, Pixels};
 use nerf::photo::{Crop, Photo, Reading};
 

@@ -1,6 +1,8 @@
 //! The gradients of the f64 reference against central differences of its own forward passes, and properties.
 
 use glam::DVec3;
+use nerf::config::Transmittance;
+use nerf::verify::reference::ColorRange;
 use nerf::verify::reference::activation::{color, color_backward, log_density, log_density_backward};
 use nerf::verify::reference::composite::{CompositeInput, CompositeOutput, composite};
 use nerf::verify::reference::grid::{FEATURES, grid_encode, grid_encode_backward, levels, table_entries};
@@ -8,8 +10,7 @@ use nerf::verify::reference::loss::Loss;
 use nerf::verify::reference::mlp::Mlp;
 use nerf::verify::reference::model::{BatchOutput, Model, Objective, RaySample, TrainingRay};
 use nerf::verify::reference::random::{random_u32, uniform};
-use nerf::verify::reference::step::Training;
-use nerf::verify::reference::{ColorRange, Transmittance};
+use nerf::verify::reference::step::ModelTraining;
 
 const CONVENTIONS: [Transmittance; 2] = [Transmittance::Exclusive, Transmittance::Inclusive];
 
@@ -283,7 +284,7 @@ fn twenty_steps_reduce_the_loss() {
     let mut random = Random::new(7);
     let model = tiny_model(&mut random);
     let rays = tiny_batch(&mut random, 12);
-    let mut training = Training::new(model.clone(), Objective::default());
+    let mut training = ModelTraining::new(model.clone(), Objective::default());
     let losses: Vec<f64> = (0..20).map(|_| training.step(&rays, 1e-2).loss).collect();
     assert!(losses.windows(2).all(|pair| pair[1] < pair[0]), "{losses:?}");
     assert!(losses[19] < 0.7 * losses[0], "{losses:?}");

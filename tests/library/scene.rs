@@ -4,16 +4,16 @@ use crate::support::folder;
 use glam::{DMat3, DVec3, dvec3};
 use nerf::camera::{Camera, Lens, LensKind, Ray};
 use nerf::capture::dataset::{Dataset, OpenOptions};
-use nerf::verify::scene::{Generate, Hit, Scene, Views, generate, names};
+use nerf::verify::scene::{Hit, Scene, SceneOptions, ViewCounts, generate, names};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-const VIEWS: Views = Views { train: 3, val: 1, test: 2 };
+const VIEWS: ViewCounts = ViewCounts { train: 3, val: 1, test: 2 };
 
-fn small(scene: &str) -> Generate {
-    Generate { views: VIEWS, size: (40, 30), ..Generate::new(scene) }
+fn small(scene: &str) -> SceneOptions {
+    SceneOptions { views: VIEWS, size: (40, 30), ..SceneOptions::new(scene) }
 }
 
 fn listing(folder: &Path, split: &str) -> Value {
@@ -69,7 +69,7 @@ fn same_options_give_the_same_bytes() {
         assert_eq!(a.len(), 2 * VIEWS.total() + 3);
         assert!(a == b, "{} differs between runs", info.name);
         let other = folder();
-        generate(&Generate { seed: 1, ..small(info.name) }, other.path(), &|_| ()).expect("generated");
+        generate(&SceneOptions { seed: 1, ..small(info.name) }, other.path(), &|_| ()).expect("generated");
         assert!(contents(other.path()) != a, "{} ignores the seed", info.name);
     }
 }
@@ -78,7 +78,7 @@ fn same_options_give_the_same_bytes() {
 fn depth_is_positive_exactly_where_alpha_is() {
     for (scene, hdr) in [("toys", true), ("courtyard", false), ("fog", true)] {
         let folder = folder();
-        generate(&Generate { hdr, ..small(scene) }, folder.path(), &|_| ()).expect("generated");
+        generate(&SceneOptions { hdr, ..small(scene) }, folder.path(), &|_| ()).expect("generated");
         for frame in listing(folder.path(), "train")["frames"].as_array().expect("frames") {
             let depth_path = frame["depth_file_path"].as_str().expect("a depth file");
             let planes = planes(&folder.path().join(depth_path));
@@ -126,7 +126,7 @@ fn cameras_look_at_the_scene() {
 #[test]
 fn fog_silhouette_and_depth_are_exact() {
     let folder = folder();
-    let options = Generate { size: (100, 100), hdr: true, samples: 6, ..small("fog") };
+    let options = SceneOptions { size: (100, 100), hdr: true, samples: 6, ..small("fog") };
     generate(&options, folder.path(), &|_| ()).expect("generated");
     let planes = planes(&folder.path().join("test/0000_depth.exr"));
     let focal = 50.0 / 20.0_f64.to_radians().tan();
@@ -180,7 +180,7 @@ fn all_of_toys_is_within_its_radius() {
 #[test]
 fn captures_carry_their_intrinsics() {
     let folder = folder();
-    let options = Generate { lenses: vec![LensKind::OpenCv], ..small("courtyard") };
+    let options = SceneOptions { lenses: vec![LensKind::OpenCv], ..small("courtyard") };
     generate(&options, folder.path(), &|_| ()).expect("generated");
     let listing = listing(folder.path(), "test");
     assert_eq!(listing["camera_model"], "OPENCV");
@@ -218,8 +218,9 @@ fn every_lens_is_written_and_read_back() {
     let kinds = LensKind::ALL.into_iter().map(|kind| vec![kind]).chain([LensKind::ALL.to_vec()]);
     for (lenses, name) in kinds.flat_map(|lenses| [(lenses.clone(), "courtyard"), (lenses, "toys")]) {
         let folder = folder();
-        let views = Views { train: 5, val: 1, test: 1 };
-        let options = Generate { lenses: lenses.clone(), views, size: (48, 24), ..Generate::new(name) };
+        let views = ViewCounts { train: 5, val: 1, test: 1 };
+        let options =
+            SceneOptions { lenses: lenses.clone(), views, size: (48, 24), ..SceneOptions::new(name) };
         generate(&options, folder.path(), &|_| ()).expect("generated");
         let dataset = Dataset::open(folder.path(), &OpenOptions::default()).expect("a dataset");
         let scene = Scene::named(name).expect("a known scene");
@@ -258,7 +259,7 @@ fn bounded_scenes_are_written_as_blender_does() {
 #[test]
 fn hdr_exceeds_one() {
     let folder = folder();
-    let options = Generate { hdr: true, size: (100, 100), ..small("toys") };
+    let options = SceneOptions { hdr: true, size: (100, 100), ..small("toys") };
     generate(&options, folder.path(), &|_| ()).expect("generated");
     let brightest = (0..3)
         .flat_map(|i| planes(&folder.path().join(format!("train/000{i}.exr")))["R"].clone())
@@ -269,17 +270,17 @@ fn hdr_exceeds_one() {
 #[test]
 fn mistakes_are_explained() {
     let folder = folder();
-    let fails = |options: &Generate, out: &Path| {
+    let fails = |options: &SceneOptions, out: &Path| {
         format!("{:#}", generate(options, out, &|_| ()).expect_err("a mistake"))
     };
     let fresh = folder.path().join("new");
     assert!(fails(&small("toy"), &fresh).contains("toys, courtyard, fog"));
-    assert!(fails(&Generate { lenses: vec![], ..small("toys") }, &fresh).contains("at least one"));
-    assert!(fails(&Generate { size: (0, 9), ..small("toys") }, &fresh).contains("0x9"));
+    assert!(fails(&SceneOptions { lenses: vec![], ..small("toys") }, &fresh).contains("at least one"));
+    assert!(fails(&SceneOptions { size: (0, 9), ..small("toys") }, &fresh).contains("0x9"));
     assert!(!fresh.exists(), "nothing is created before the options are checked");
     fs::write(folder.path().join("notes.txt"), "mine").expect("written");
     assert!(fails(&small("toys"), folder.path()).contains("not empty"));
     assert!(fails(&small("toys"), &folder.path().join("notes.txt")).contains("notes.txt"));
-    assert!(Views::of_total(2).is_err());
-    assert_eq!(Views::of_total(100).expect("enough"), Views { train: 82, val: 6, test: 12 });
+    assert!(ViewCounts::of_total(2).is_err());
+    assert_eq!(ViewCounts::of_total(100).expect("enough"), ViewCounts { train: 82, val: 6, test: 12 });
 }

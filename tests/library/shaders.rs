@@ -9,10 +9,10 @@ use nerf::config::{Accumulation, Config};
 use nerf::field::layer::Product;
 use nerf::field::link::{self, Link};
 use nerf::field::{Capabilities, LAYOUTS, Plan, SceneFeatures, Space, records, variants};
-use nerf::gpu::banks::Capacity;
-use nerf::gpu::kernel::Layout as StructLayout;
+use nerf::gpu::kernel::StructLayout;
+use nerf::gpu::paged_array::PageCapacity;
 use nerf::gpu::source::{Linked, Source};
-use nerf::gpu::tensor::Memory;
+use nerf::gpu::tensor::TensorMemory;
 use wgpu::{BindingType, naga};
 
 /// A file of `shaders/` by its name below it, without the ending.
@@ -43,10 +43,10 @@ fn definitions(text: &str) -> Vec<String> {
     names
 }
 
-fn plan(memory: Memory, cascades: u32) -> Plan {
+fn plan(memory: TensorMemory, cascades: u32) -> Plan {
     let mut config = Config::default();
     config.grid.finest = 2048;
-    let needs = SceneFeatures { alpha: true, ..SceneFeatures::default() };
+    let features = SceneFeatures { alpha: true, ..SceneFeatures::default() };
     let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades, source: String::new() };
     let product = Product { rows: 2, shared_weights: false };
     let adapter = Capabilities { memory, ..Capabilities::GPU };
@@ -54,7 +54,7 @@ fn plan(memory: Memory, cascades: u32) -> Plan {
         product,
         accumulation: Accumulation::Exchange,
         chunks: 32,
-        ..Plan::suited_to(adapter, config, needs, Space::from(&bounds))
+        ..Plan::suited_to(adapter, config, features, Space::from(&bounds))
     }
 }
 
@@ -195,21 +195,21 @@ fn fixed(file: &str) -> Vec<(&'static str, &'static str)> {
 
 #[test]
 fn every_combination_links() {
-    for (memory, cascades) in [(Memory::Buffers, 1), (Memory::Textures, 3)] {
+    for (memory, cascades) in [(TensorMemory::Buffers, 1), (TensorMemory::Textures, 3)] {
         let mut linker = Linker::new(plan(memory, cascades));
-        let capacity = Capacity::of(&wgpu::Limits::default(), memory);
+        let capacity = PageCapacity::of(&wgpu::Limits::default(), memory);
         for file in link::entry_points() {
             // What single kernels know of their own.
             let own = [("CAPACITY", 16), ("CAMERA_COUNT", 3), ("PARAMETER_QUADS", 8)];
             let kernel = Link::of_file(file, file).counts(&own).float("RATE", 1.0);
             let main = text(file);
             let count = match link::needs(&main).any(|needed| needed == "pixels") {
-                // How many banks the photos fill, and which lenses the cameras have.
-                true => [1, capacity.banks()]
+                // How many pages the photos fill, and which lenses the cameras have.
+                true => [1, capacity.pages()]
                     .into_iter()
-                    .map(|banks| {
+                    .map(|pages| {
                         linker.link_all(
-                            &kernel.clone().part(records::NAME, capacity.part(records::NAME, banks)),
+                            &kernel.clone().part(records::NAME, capacity.part(records::NAME, pages)),
                             &main,
                             &fixed(file),
                         )
@@ -262,9 +262,9 @@ fn every_combination_links() {
 
 #[test]
 fn every_set_of_lenses_links() {
-    let mut linker = Linker::new(plan(Memory::Buffers, 1));
+    let mut linker = Linker::new(plan(TensorMemory::Buffers, 1));
     for lenses in lens_sets() {
-        linker.plan.needs.lenses = lenses;
+        linker.plan.features.lenses = lenses;
         // Rays of a view begin, and their samples are told their depth.
         let of_view = [
             ("counted", "read"),
@@ -372,7 +372,7 @@ fn errors_name_the_part_and_its_line() {
 #[test]
 fn what_is_missing_is_named() {
     let message = |link: &Link| {
-        let error = plan(Memory::Buffers, 1).source(link).expect_err("something is missing");
+        let error = plan(TensorMemory::Buffers, 1).source(link).expect_err("something is missing");
         format!("{error:#}")
     };
     assert!(message(&Link::of("no such kernel")).contains("'no such kernel'"));

@@ -1,13 +1,13 @@
-//! Trainings that would break a careless trainer: each guard has a test that fails without it.
+//! Training runs that would break a careless trainer: each guard has a test that fails without it.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use nerf::camera::Bounds;
 use nerf::camera::{Camera, Lens, LensKind};
 use nerf::config::{Accumulation, Batch, ColorLoss, Config, Grid, March, Network, Occupancy};
-use nerf::field::render::{Renderer, View};
+use nerf::field::renderer::{Renderer, View};
 use nerf::field::state::State;
-use nerf::field::train::{StepStats, Trainer};
-use nerf::field::views::Views;
+use nerf::field::trainer::{StepStats, Trainer};
+use nerf::field::training_views::TrainingViews;
 use nerf::field::{Counters, Field, Plan, SceneFeatures, Space};
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::{Image, Pixels};
@@ -93,14 +93,14 @@ impl Scene {
         let adapter = adapter::choose(choice.as_deref()).expect("an adapter");
         let gpu = Arc::new(Gpu::open(&adapter).expect("it opens"));
         let (cameras, images, bounds) = (self.cameras(), self.images(), self.bounds());
-        let needs = SceneFeatures {
+        let features = SceneFeatures {
             lenses: LensKind::among(&cameras),
             alpha: self.has_alpha,
             hdr: images.iter().any(Image::is_hdr),
             ..SceneFeatures::default()
         };
-        let plan = Plan::new(&gpu, config, needs, Space::from(&bounds));
-        let mut views = Views::new(&gpu, &plan, &cameras).expect("room");
+        let plan = Plan::new(&gpu, config, features, Space::from(&bounds));
+        let mut views = TrainingViews::new(&gpu, &plan, &cameras).expect("room");
         images.into_iter().for_each(|image| views.add(&image.into()).expect("its photo"));
         let trainer = Trainer::new(Field::new(&gpu, plan).expect("a field"), views).expect("a trainer");
         Training { trainer, gpu, camera: cameras[0].clone() }
@@ -152,7 +152,7 @@ impl Training {
     #[track_caller]
     fn finite_view(&self) -> View {
         let field = self.trainer.field();
-        let mut renderer = Renderer::new(field, &field.plan().needs.lenses).expect("a renderer");
+        let mut renderer = Renderer::new(field, &field.plan().features.lenses).expect("a renderer");
         let view = renderer.render(&self.camera).expect("a view");
         assert!(view.color.as_flattened().iter().chain(&view.depth).all(|value| value.is_finite()));
         view

@@ -1,8 +1,8 @@
 //! Rays that are hard on arithmetic, with what the f64 reference makes of them.
 
-use nerf::verify::check::draw::Random;
-use nerf::verify::check::hard_rays::HardRay;
-use nerf::verify::reference::Transmittance;
+use nerf::config::Transmittance;
+use nerf::verify::check::inputs::Random;
+use nerf::verify::check::stress_rays::StressRay;
 use nerf::verify::reference::vectors::GoldenFile;
 
 /// Rays of each kind.
@@ -62,11 +62,11 @@ pub(crate) fn golden(convention: Transmittance) -> GoldenFile {
     let rays_in_batch = RAYS * FAMILIES.len() as u32;
     let each = FAMILIES.iter().flat_map(|family| (0..RAYS).map(move |_| family));
     let rays: Vec<_> = each.map(|family| family.ray(&mut random)).collect();
-    HardRay::golden(convention, rays_in_batch, &rays)
+    StressRay::golden(convention, rays_in_batch, &rays)
 }
 
 impl Family {
-    fn ray(&self, random: &mut Random) -> HardRay {
+    fn ray(&self, random: &mut Random) -> StressRay {
         let delta: Vec<f64> = (0..self.samples).map(|_| random.number(0.001, 0.1)).collect();
         let s: Vec<f64> = (delta.iter().enumerate())
             .map(|(i, delta)| {
@@ -77,7 +77,7 @@ impl Family {
             })
             .collect();
         let high = self.brightest;
-        HardRay {
+        StressRay {
             name: self.name.to_owned(),
             s,
             delta,

@@ -8,7 +8,7 @@
 //! Evaluated front to back, the sum over later samples is `R − Σ_prefix`: it cancels once most of the colour
 //! is in the prefix, and `τ_i` multiplies what rounding left. [`nerf::verify::reference::composite`] has the stable form.
 
-use nerf::verify::reference::Transmittance;
+use nerf::config::Transmittance;
 use nerf::verify::reference::composite::CompositeInput;
 
 /// Arithmetic in which the textbook gradient is evaluated.

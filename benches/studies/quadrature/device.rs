@@ -3,17 +3,17 @@
 use super::medium::Samples;
 use anyhow::{Context, Result, ensure};
 use glam::DVec3;
-use nerf::config::{self, Config};
+use nerf::config::Config;
+use nerf::config::Transmittance;
 use nerf::field::{Plan, color, composite};
 use nerf::gpu::Gpu;
 use nerf::gpu::pass::Stage;
 use nerf::gpu::timer::Timer;
 use nerf::verify::check::{Setup, Workbench};
-use nerf::verify::reference::Transmittance;
 use nerf::verify::reference::model::{RaySample, TrainingRay};
 use std::sync::Arc;
 
-/// The transmittance of the early stop, that of a training.
+/// The transmittance of the early stop, that of a training run.
 pub(crate) const STOP: f64 = 1e-4;
 /// Samples on the device at once: about 700 bytes each, and on a GPU enough to fill it.
 const SAMPLES_ON_CPU: usize = 1 << 18;
@@ -144,7 +144,7 @@ impl Device {
         let kept = counters.kept as usize;
         let colors: Vec<[f32; 3]> =
             rays.iter().flat_map(|ray| &ray.color).map(|color| color.map(|c| c as f32)).collect();
-        let color = |row: nerf::verify::check::Kept| {
+        let color = |row: nerf::verify::check::KeptSample| {
             let [r, g, b] =
                 colors.get(row.sample as usize).context("a kept sample is none of those uploaded")?;
             Ok([*r, *g, *b, 0.0])
@@ -167,16 +167,13 @@ impl Device {
     }
 }
 
-/// Selection, as a training has it, and compositing, with the variant's constants.
+/// Selection, as a training run has it, and compositing, with the variant's constants.
 fn stages(bench: &Workbench, variant: Variant) -> Result<Vec<Stage>> {
     let mut config = Config::clone(&bench.plan.config);
     config.selection.stop_transmittance = variant.stop();
-    config.transmittance = match variant.transmittance {
-        Transmittance::Exclusive => config::Transmittance::Exclusive,
-        Transmittance::Inclusive => config::Transmittance::Inclusive,
-    };
+    config.transmittance = variant.transmittance;
     let plan = Plan { config: config.into(), ..bench.plan.clone() };
-    let mut stages = color::stages(&bench.gpu, &plan, &bench.workspace, color::Selection::Training)?;
+    let mut stages = color::stages(&bench.gpu, &plan, &bench.workspace, color::SelectionMode::Training)?;
     stages.retain(|stage| SELECTING.contains(&stage.bound.label.as_str()));
     ensure!(stages.len() == SELECTING.len(), "selection has {} of the stages {SELECTING:?}", stages.len());
     stages.push(composite::stage(&bench.gpu, &plan, &bench.workspace, false)?);

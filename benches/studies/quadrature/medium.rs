@@ -21,7 +21,7 @@
 //!   saves the more time, the more of the ray lies behind.
 //! - *Rounding.* The kernel's f32 sums differ from the f64 ones by 3·10⁻⁸ with 4 steps to 4·10⁻⁷ with 1024.
 
-use nerf::verify::reference::Transmittance;
+use nerf::config::Transmittance;
 use nerf::verify::reference::composite::{CompositeInput, composite};
 use nerf::verify::reference::selection::{Luck, Selection, select};
 

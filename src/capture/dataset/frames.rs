@@ -3,7 +3,8 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use super::notes::{Notes, Severity};
+use super::notes::Notes;
+use crate::capture::diagnostics::Severity;
 
 /// Extensions that a listed name may lack, the most common first.
 const EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "exr", "webp", "tif", "tiff", "bmp", "hdr"];

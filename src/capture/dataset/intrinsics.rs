@@ -1,9 +1,9 @@
 //! Focal length, principal point and lens, from whichever keys a tool chose to write.
 
 mod calibration;
-mod extent;
 mod focal;
-mod lens;
+mod image_size;
+mod lens_model;
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,10 +11,11 @@ use anyhow::{Result, bail, ensure};
 use glam::{DAffine3, DVec2};
 
 use super::json::{Fields, REMEDY};
-use super::notes::{Note, Notes, Severity};
+use super::notes::Notes;
 use crate::camera::{Camera, Lens};
-use extent::{Extent, Measure};
+use crate::capture::diagnostics::{Diagnostic, Severity};
 use focal::{Angles, Focal};
+use image_size::{ImageSize, Measure};
 
 /// The intrinsics of one frame as the file states them, not yet tied to an image size.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,11 +34,11 @@ pub(super) const OBJECTS: [&str; 4] = ["intrinsics", "camera_intrinsics", "camer
 /// What one object of a file says about a camera: a frame, an object nested in it, or the file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stated {
-    size: Extent,
+    size: ImageSize,
     focal_px: Option<DVec2>,
     angles: Angles,
     center_px: Option<DVec2>,
-    lens: lens::Stated,
+    lens: lens_model::StatedLens,
 }
 
 impl Stated {
@@ -45,11 +46,11 @@ impl Stated {
     pub(super) fn read(fields: Fields, owner: &str, notes: &mut Notes) -> Result<Self> {
         let matrix = calibration::read(fields, owner, notes)?;
         Ok(Self {
-            size: Extent::read(fields)?,
+            size: ImageSize::read(fields)?,
             focal_px: focal::pixels(fields)?.or(matrix.map(|matrix| matrix.focal_px)),
             angles: Angles::read(fields, owner, notes)?,
             center_px: center(fields)?.or(matrix.and_then(|matrix| matrix.center_px)),
-            lens: lens::Stated::read(fields, owner, notes)?,
+            lens: lens_model::StatedLens::read(fields, owner, notes)?,
         })
     }
 }
@@ -57,8 +58,8 @@ impl Stated {
 impl Intrinsics {
     /// Chooses from what is stated, in falling priority: the frame, what is nested in it, the file.
     pub(super) fn resolve(layers: &[&Stated], owner: &str, notes: &mut Notes) -> Result<Self> {
-        let lens = lens::resolve(layers.iter().map(|layer| &layer.lens), owner, notes);
-        let declared = layers.iter().fold(Extent::default(), |known, layer| known.or(layer.size));
+        let lens = lens_model::resolve(layers.iter().map(|layer| &layer.lens), owner, notes);
+        let declared = layers.iter().fold(ImageSize::default(), |known, layer| known.or(layer.size));
         let size_of = |layer: &Stated| layer.size.or(declared).or(layer.implied_size());
         let center =
             layers.iter().find_map(|layer| Some(Measure { px: layer.center_px?, size: size_of(layer) }));
@@ -112,7 +113,7 @@ impl Intrinsics {
 
     /// The camera that took an image of this size in pixels, and what is to be said about it. Lengths in
     /// pixels that belong to another size are scaled.
-    pub fn camera(&self, size: [u32; 2], pose: DAffine3) -> (Camera, Vec<Note>) {
+    pub fn camera(&self, size: [u32; 2], pose: DAffine3) -> (Camera, Vec<Diagnostic>) {
         let actual = DVec2::new(f64::from(size[0]), f64::from(size[1]));
         let mut remarks = Vec::new();
         let (focal_px, center_px) = match self.focal {
@@ -127,9 +128,9 @@ impl Intrinsics {
     }
 
     /// Focal lengths and principal point at the size of an image.
-    fn perspective(&self, focal: Focal, actual: DVec2, remarks: &mut Vec<Note>) -> (DVec2, DVec2) {
+    fn perspective(&self, focal: Focal, actual: DVec2, remarks: &mut Vec<Diagnostic>) -> (DVec2, DVec2) {
         let guess = self.center.and_then(|center| center.guessed_size(actual));
-        let at_actual = |measure: Measure, remarks: &mut Vec<Note>| {
+        let at_actual = |measure: Measure, remarks: &mut Vec<Diagnostic>| {
             let measure = Measure { size: measure.size.or_guess(guess), ..measure };
             let (px, remark) = measure.at(actual);
             if let Some(remark) = remark.filter(|remark| !remarks.contains(remark)) {
@@ -144,15 +145,11 @@ impl Intrinsics {
         let center_px = self.center.map_or(0.5 * actual, |center| at_actual(center, remarks));
         let offset = (center_px / actual - 0.5).abs().max_element();
         if offset > 0.4 {
-            remarks.push(Note {
-                remedy: None,
-                severity: Severity::Warning,
-                message: format!(
-                    "the principal point {:.1}, {:.1} lies at the edge of the image of {}x{} pixels or outside; \
+            remarks.push(Diagnostic::warning(format!(
+                "the principal point {:.1}, {:.1} lies at the edge of the image of {}x{} pixels or outside; \
                      unless the image was cut out of a larger one, `cx` and `cy` are wrong",
-                    center_px.x, center_px.y, actual.x, actual.y
-                ),
-            });
+                center_px.x, center_px.y, actual.x, actual.y
+            )));
         }
         (focal_px, center_px)
     }
@@ -160,16 +157,16 @@ impl Intrinsics {
 
 impl Stated {
     /// The size at which focal lengths and fields of view say the same, for files that have no `w` and `h`.
-    fn implied_size(&self) -> Extent {
+    fn implied_size(&self) -> ImageSize {
         let Some(focal) = self.focal_px else {
-            return Extent::default();
+            return ImageSize::default();
         };
         let [x, y] = self.angles.half_tangents();
-        Extent::implied(x.map(|tangent| 2.0 * focal.x * tangent), y.map(|tangent| 2.0 * focal.y * tangent))
+        ImageSize::implied(x.map(|tangent| 2.0 * focal.x * tangent), y.map(|tangent| 2.0 * focal.y * tangent))
     }
 
     /// Two statements about the same lens that disagree are worth a look at the file.
-    fn compare(&self, size: Extent, lens: &Lens, owner: &str, notes: &mut Notes) {
+    fn compare(&self, size: ImageSize, lens: &Lens, owner: &str, notes: &mut Notes) {
         let (Some(focal), Some(size)) = (self.focal_px, size.both()) else {
             return;
         };
@@ -196,16 +193,12 @@ impl Stated {
 }
 
 /// A panorama that is not twice as wide as high hardly shows the whole sphere.
-fn sphere_remark(actual: DVec2) -> Option<Note> {
-    ((0.5 * actual.x / actual.y - 1.0).abs() > 0.02).then(|| Note {
-        remedy: None,
-        severity: Severity::Warning,
-        message: format!(
+fn sphere_remark(actual: DVec2) -> Option<Diagnostic> {
+    ((0.5 * actual.x / actual.y - 1.0).abs() > 0.02).then(|| Diagnostic::warning(format!(
             "an equirectangular image is twice as wide as high, this one has {}x{} pixels; it is taken as the \
              whole sphere, squeezed",
             actual.x, actual.y
-        ),
-    })
+        )))
 }
 
 /// Two numbers that come together; one alone is an error.

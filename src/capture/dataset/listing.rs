@@ -1,7 +1,8 @@
 //! What a file of a dataset lists, before any image is looked for.
 
 use super::intrinsics::Intrinsics;
-use super::notes::{Note, Notes};
+use super::notes::Notes;
+use crate::capture::diagnostics::Diagnostic;
 use crate::photo::Split;
 use glam::{DAffine3, DVec3};
 
@@ -9,7 +10,7 @@ use glam::{DAffine3, DVec3};
 #[derive(Debug)]
 pub struct Listing {
     /// The frames in the order of the file.
-    pub frames: Vec<Entry>,
+    pub frames: Vec<FrameEntry>,
     /// The scene box of instant-ngp's keys, if the file has one of them.
     pub scene_box: Option<SceneBox>,
     /// Which family of tools writes such files.
@@ -19,7 +20,7 @@ pub struct Listing {
 
 /// One frame as listed.
 #[derive(Clone, Debug)]
-pub struct Entry {
+pub struct FrameEntry {
     /// `frame 3 'images/0004.png'`, for messages; counts from 0.
     pub label: String,
     /// The image, as the file spells it, with forward slashes.
@@ -38,7 +39,7 @@ pub struct Entry {
 
 impl Listing {
     /// What is to be said about how the file was read.
-    pub fn notes(&self) -> Vec<Note> {
+    pub fn notes(&self) -> Vec<Diagnostic> {
         self.notes.clone().finish()
     }
 }

@@ -1,46 +1,20 @@
 //! What a reader of the dataset should know about how it was read.
 
 use std::collections::HashMap;
-use std::fmt;
 
+use crate::capture::diagnostics::{Diagnostic, Severity};
 use crate::support::remedy::{Advised, Remedy};
-
-/// How much a [`Note`] matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
-    /// An assumption or repair that is usually right.
-    Note,
-    /// Something that probably makes results worse.
-    Warning,
-}
-
-/// One remark about a dataset, a full sentence.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Note {
-    /// How much it matters.
-    pub severity: Severity,
-    /// The remark.
-    pub message: String,
-    /// The user's choice that the remark tells of in plain words, if there is one.
-    pub remedy: Option<Remedy>,
-}
-
-impl fmt::Display for Note {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)
-    }
-}
 
 /// Collects notes; the same remark about many frames becomes one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Notes {
-    entries: Vec<Entry>,
+    entries: Vec<Pending>,
     /// Where a remark is, by its wording without the numbers in it.
     index: HashMap<String, usize>,
 }
 
 #[derive(Clone, Debug)]
-struct Entry {
+struct Pending {
     severity: Severity,
     message: String,
     remedy: Option<Remedy>,
@@ -60,7 +34,7 @@ impl Notes {
     /// A remark with something to do about it.
     pub(crate) fn advise(&mut self, severity: Severity, advised: Advised) {
         let message = advised.to_string();
-        self.merge(Entry { severity, message, remedy: Some(advised.remedy), first_frame: None, count: 1 });
+        self.merge(Pending { severity, message, remedy: Some(advised.remedy), first_frame: None, count: 1 });
     }
 
     /// A remark about one frame. Remarks that differ in numbers only become one, with the first numbers.
@@ -70,10 +44,10 @@ impl Notes {
 
     fn add(&mut self, severity: Severity, message: String, frame: Option<&str>) {
         let first_frame = frame.map(Into::into);
-        self.merge(Entry { severity, message, remedy: None, first_frame, count: 1 });
+        self.merge(Pending { severity, message, remedy: None, first_frame, count: 1 });
     }
 
-    fn merge(&mut self, entry: Entry) {
+    fn merge(&mut self, entry: Pending) {
         let is_wording = |c: &char| !c.is_ascii_digit() && !matches!(c, '.' | '-');
         let wording: String = match entry.first_frame {
             Some(_) => entry.message.chars().filter(is_wording).collect(),
@@ -94,8 +68,9 @@ impl Notes {
         }
     }
 
-    pub(crate) fn finish(self) -> Vec<Note> {
-        let finish = |entry: Entry| Note {
+    pub(crate) fn finish(self) -> Vec<Diagnostic> {
+        let finish = |entry: Pending| Diagnostic {
+            frames: Vec::new(),
             severity: entry.severity,
             remedy: entry.remedy,
             message: match (entry.first_frame, entry.count) {

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
 
-use super::listing::Entry;
-use super::located::{Built, Present, locate};
+use super::alpha_probe::AlphaProbe;
+use super::listing::FrameEntry;
 use super::notes::Notes;
-use super::samples::Samples;
+use super::resolved_frames::{Built, Present, locate};
 use super::transforms;
 use super::{Dataset, HoldOut, OpenOptions, Split, splits};
 use crate::camera::Bounds;
@@ -28,7 +28,7 @@ impl Dataset {
         let mut notes = Notes::default();
         let sources = sources(path, &mut notes)?;
         let root = folder_of(&sources[0].1);
-        let mut located = Vec::new();
+        let mut resolved = Vec::new();
         let mut scene_box = None;
         let files: Vec<&Path> = sources.iter().map(|(_, path)| path.as_path()).collect();
         let listings = transforms::read(&files, &mut notes)?;
@@ -36,9 +36,9 @@ impl Dataset {
         for ((split, _), listing) in sources.iter().zip(listings) {
             // The training file speaks for the scene.
             scene_box = scene_box.or(listing.scene_box);
-            located.extend(locate(listing, *split, &root, options.allow_missing, &mut notes)?);
+            resolved.extend(locate(listing, *split, &root, options.allow_missing, &mut notes)?);
         }
-        let present = Present::new(located, &root, options, &mut notes)?;
+        let present = Present::new(resolved, &root, options, &mut notes)?;
         let bit_depth = present.bit_depth(&mut notes)?;
         let (listed, missing) = (present.listed, present.missing.clone());
         let Built { frames, members, damaged } = present.build(&root, options, &mut notes)?;
@@ -48,14 +48,14 @@ impl Dataset {
         let used = if splits.train.is_empty() { (0..frames.len()).collect() } else { splits.train.clone() };
         let has_images = missing.len() < listed;
         let mut reading = options.reading.clone();
-        let samples = Samples {
+        let probe = AlphaProbe {
             frames: used.iter().map(|&i| &frames[i]).collect(),
             bits: bit_depth,
             skips_damaged: options.allow_missing,
         };
-        reading.alpha = samples.alpha(&reading, &mut notes)?;
+        reading.alpha = probe.alpha(&reading, &mut notes)?;
         let surroundings = match has_images {
-            true => samples.surroundings(&reading)?,
+            true => probe.surroundings(&reading)?,
             false => Surroundings::Unknown,
         };
         let cameras: Vec<&Camera> = used.iter().map(|&i| &frames[i].camera).collect();
@@ -93,7 +93,7 @@ fn thin_out(train: &mut Vec<usize>, most: Option<usize>, notes: &mut Notes) {
 /// Reads the cameras of a single file, in its order, without looking for images: name and camera. Sizes
 /// come from the file, else `default_size` in pixels.
 pub fn read_cameras(path: &Path, default_size: [u32; 2]) -> Result<Vec<(String, Camera)>> {
-    let camera = |entry: Entry| {
+    let camera = |entry: FrameEntry| {
         let size = entry.declared_size().unwrap_or(default_size);
         let camera = entry.intrinsics.camera(size, entry.world_from_camera).0;
         (entry.file_path, camera)
@@ -162,7 +162,7 @@ fn folder_of(file: &Path) -> PathBuf {
     }
 }
 
-impl Entry {
+impl FrameEntry {
     /// The size in whole pixels that the file declares.
     pub(super) fn declared_size(&self) -> Option<[u32; 2]> {
         let size = self.intrinsics.likely_size()?.round().max(glam::DVec2::ONE);

@@ -1,6 +1,6 @@
 //! The part of an image that is used, and its size.
 
-use crate::capture::image::Window;
+use crate::capture::image_file::Window;
 use crate::photo::{Crop, Reading};
 use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Result, bail, ensure};

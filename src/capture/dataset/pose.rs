@@ -7,7 +7,8 @@ use anyhow::{Context, Result, bail, ensure};
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 
 use super::json::{Fields, Matrix};
-use super::notes::{Notes, Severity};
+use super::notes::Notes;
+use crate::capture::diagnostics::Severity;
 
 /// Positions beyond this many world units are a mistake, and nothing that f32 can still tell apart.
 const FARTHEST: f64 = 1e12;

@@ -1,6 +1,6 @@
 //! Files beside a photo that say more about its pixels: masks, alpha and depth.
 //!
-//! A mask says which pixels tell nothing; that is something else than alpha, which says where there is nothing.
+//! A mask says which pixels are not to be learnt from; that is something else than alpha, which says where there is nothing.
 //! Tools do not agree on what the colours of a mask mean, so it depends on how a mask was found:
 //!
 //! | found by | ignored | convention of |
@@ -9,7 +9,7 @@
 //! | folder `masks` beside the images' folder or in the dataset | black | brush, COLMAP |
 //! | `dynamic_mask_<stem>.png` beside the image | everything but black | instant-ngp |
 //!
-//! All that there are count, and a pixel that one of them ignores is ignored.
+//! A photo may have several; a pixel that one of them ignores is ignored.
 
 use std::collections::{HashMap, HashSet};
 use std::ffi::{OsStr, OsString};
@@ -19,9 +19,10 @@ use anyhow::Result;
 
 use super::frames;
 use super::json::Fields;
-use super::listing::{DepthEntry, Entry};
-use super::notes::{Notes, Severity};
-use crate::capture::image::Header;
+use super::listing::{DepthEntry, FrameEntry};
+use super::notes::Notes;
+use crate::capture::diagnostics::Severity;
+use crate::capture::image_file::Header;
 use crate::photo::BitDepth;
 
 /// The files beside one photo.
@@ -49,7 +50,7 @@ pub(super) struct Mask {
     pub(super) ignores: Ignores,
 }
 
-/// Which pixels of a mask mean that the photo's tell nothing.
+/// Which pixels of a mask mean that the photo's are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ignores {
     Black,
@@ -77,7 +78,7 @@ pub(super) fn listed(frame: Fields, file: Fields) -> Result<(Option<String>, Opt
         stated => stated,
     };
     let depth = match (name("depth_file_path")?, name("depth_path")?) {
-        // nerfstudio's depth is in millimetres unless it is told otherwise.
+        // nerfstudio's depth is in millimetres unless the file says otherwise.
         (Some(path), _) => Some(DepthEntry { path, world_per_unit: stated.or(Some(1e-3)) }),
         (None, Some(path)) => Some(DepthEntry { path, world_per_unit: stated }),
         (None, None) => None,
@@ -100,7 +101,7 @@ impl<'a> Finder<'a> {
     }
 
     /// The files beside the photo of `entry`, which was found at `image`.
-    pub(super) fn find(&mut self, entry: &Entry, image: &Path, notes: &mut Notes) -> Sidecars {
+    pub(super) fn find(&mut self, entry: &FrameEntry, image: &Path, notes: &mut Notes) -> Sidecars {
         let mut masks = Vec::new();
         if let Some(listed) = &entry.mask_path {
             match frames::locate(self.root, listed) {
@@ -182,7 +183,7 @@ impl<'a> Finder<'a> {
         [long, short].into_iter().find(|path| self.is_there(path))
     }
 
-    fn depth(&self, entry: &Entry, notes: &mut Notes) -> Option<Depth> {
+    fn depth(&self, entry: &FrameEntry, notes: &mut Notes) -> Option<Depth> {
         let listed = entry.depth.as_ref()?;
         let Some((path, _)) = frames::locate(self.root, &listed.path) else {
             notes.frame(Severity::Warning, &entry.label, "its depth file is missing");

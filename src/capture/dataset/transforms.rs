@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::intrinsics::{self, Intrinsics, Stated};
 use super::json::{self, Fields, REMEDY, describe, shortened};
-use super::listing::{Entry, Listing, SceneBox};
+use super::listing::{FrameEntry, Listing, SceneBox};
 use super::notes::Notes;
 use super::pose::{self, Axes, handedness};
 use super::sidecars;
@@ -116,7 +116,7 @@ impl<'a> File<'a> {
         frame: &Value,
         label: &str,
         notes: &mut Notes,
-    ) -> Result<Option<Entry>> {
+    ) -> Result<Option<FrameEntry>> {
         let Value::Object(map) = frame else {
             bail!("expected an object, found {}; {REMEDY}", describe(frame));
         };
@@ -131,7 +131,7 @@ impl<'a> File<'a> {
             return Ok(None);
         };
         let (label, split) = (label.to_owned(), self.section.split);
-        Ok(Some(Entry { label, intrinsics, world_from_camera, split, file_path, mask_path, depth }))
+        Ok(Some(FrameEntry { label, intrinsics, world_from_camera, split, file_path, mask_path, depth }))
     }
 }
 

@@ -1,6 +1,6 @@
 //! How much of the scene box the cameras see, from a grid of rays through every picture.
 
-use super::{Finding, Scene, Spread};
+use super::{CameraSet, Diagnostic, Spread};
 use crate::camera::Bounds;
 use crate::camera::Camera;
 use crate::support::format::{count, percent};
@@ -16,14 +16,14 @@ const MOST_WITHOUT_RAY: f64 = 0.3;
 #[derive(Clone, Debug)]
 pub struct Coverage {
     /// One per view.
-    pub pictures: Vec<Picture>,
+    pub pictures: Vec<PictureShares>,
     /// Indices of the frames that see least of the whole box, worst first.
     pub worst: Vec<usize>,
 }
 
 /// What part of a picture shows the scene box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Picture {
+pub struct PictureShares {
     /// The part whose rays meet the whole box.
     pub outer: f64,
     /// The part whose rays meet the inner cube.
@@ -33,7 +33,7 @@ pub struct Picture {
 }
 
 impl Coverage {
-    pub(super) fn of(scene: &Scene<'_>) -> Self {
+    pub(super) fn of(scene: &CameraSet<'_>) -> Self {
         let cameras: Vec<&Camera> = scene.cameras().collect();
         let bounds = &scene.dataset.bounds;
         let pictures: Vec<_> = cameras.par_iter().map(|camera| picture(camera, bounds)).collect();
@@ -58,17 +58,17 @@ impl Coverage {
         Spread::of(self.pictures.iter().map(|picture| picture.inner))
     }
 
-    pub(super) fn findings(&self, scene: &Scene<'_>) -> Vec<Finding> {
+    pub(super) fn findings(&self, scene: &CameraSet<'_>) -> Vec<Diagnostic> {
         let mut findings = Vec::new();
         let blind = scene.which(|view| self.pictures[view].outer == 0.0);
         if blind.len() == scene.count() {
-            findings.push(Finding::error(
+            findings.push(Diagnostic::error(
                 "no camera sees any of the scene box, so there is nothing to train on; check the poses, or write \
                  `aabb`: [[x, y, z], [x, y, z]], the corners of what to show, into the file",
             ));
         } else if !blind.is_empty() {
             findings.push(
-                Finding::warning(format!(
+                Diagnostic::warning(format!(
                     "{} of {} see nothing of the scene box, and are trained on for nothing: {}; check their poses, or \
                      write a larger box (`aabb`, `aabb_scale`) into the file",
                     blind.len(),
@@ -82,7 +82,7 @@ impl Coverage {
         if !rayless.is_empty() {
             let worst = self.pictures.iter().map(|picture| picture.rayless).fold(0.0, f64::max);
             findings.push(
-                Finding::warning(format!(
+                Diagnostic::warning(format!(
                     "the lens model has no ray for up to {} of the picture in {}: {}; check the distortion \
                      coefficients and `camera_model`",
                     percent(worst),
@@ -96,7 +96,7 @@ impl Coverage {
     }
 }
 
-fn picture(camera: &Camera, bounds: &Bounds) -> Picture {
+fn picture(camera: &Camera, bounds: &Bounds) -> PictureShares {
     let size = dvec2(f64::from(camera.width), f64::from(camera.height));
     let (mut outer, mut inner, mut rayless) = (0, 0, 0);
     for index in 0..SIDE * SIDE {
@@ -110,5 +110,5 @@ fn picture(camera: &Camera, bounds: &Bounds) -> Picture {
         }
     }
     let part = |rays: u32| f64::from(rays) / f64::from(SIDE * SIDE);
-    Picture { outer: part(outer), inner: part(inner), rayless: part(rayless) }
+    PictureShares { outer: part(outer), inner: part(inner), rayless: part(rayless) }
 }

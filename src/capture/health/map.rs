@@ -11,9 +11,9 @@ use crate::camera::{Camera, Lens};
 use crate::capture::dataset::Dataset;
 use crate::photo::Split;
 use crate::support::format::{count, length, point};
-use drawing::{Anchor, Color, Shape, Stroke};
+use drawing::{Anchor, Color, DrawnShape, Stroke};
 use glam::{DVec2, DVec3, dvec2};
-use panel::{Panel, Projection};
+use panel::{Panel, PanelProjection};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -44,7 +44,7 @@ pub fn draw(dataset: &Dataset, survey: &Survey, marked: &HashSet<usize>) -> Draw
     let map = Map::new(dataset, survey, marked);
     let mut drawing = Drawing::new(SIZE, GROUND);
     let width = 0.5 * (SIZE.x - 3.0 * MARGIN);
-    let projections = Projection::above_and_beside(survey.gaze.up);
+    let projections = PanelProjection::above_and_beside(survey.directions.up);
     let corners = [dvec2(MARGIN, HEADER), dvec2(2.0 * MARGIN + width, HEADER)];
     let size = dvec2(width, SIZE.y - HEADER - FOOTER);
     let range = map.range(&projections, size);
@@ -103,7 +103,7 @@ impl<'a> Map<'a> {
     /// What is to be seen: the inner cube, the focus, and the cameras but for those far away that are marked.
     fn extent(&self) -> (DVec3, DVec3) {
         let bounds = &self.dataset.bounds;
-        let mut low = self.survey.gaze.focus;
+        let mut low = self.survey.directions.focus;
         let mut high = low;
         let mut include = |point: DVec3| (low, high) = (low.min(point), high.max(point));
         let positions = |is_marked: bool| {
@@ -126,7 +126,7 @@ impl<'a> Map<'a> {
         if low == high { (low - 1.0, high + 1.0) } else { (low, high) }
     }
 
-    fn range(&self, projections: &[Projection; 2], size: DVec2) -> Range {
+    fn range(&self, projections: &[PanelProjection; 2], size: DVec2) -> Range {
         let (low, high) = self.extent();
         let center = 0.5 * (low + high);
         let corners = panel::corners(low, high);
@@ -141,7 +141,8 @@ impl<'a> Map<'a> {
 
     /// Returns whether some of the whole box is inside.
     fn draw_panel(&self, panel: &Panel, title: &str, drawing: &mut Drawing) -> bool {
-        drawing.push(Shape::rectangle(panel.corner, panel.size).with(Stroke::new(FAINT.faint(0.5), 1.0)));
+        drawing
+            .push(DrawnShape::rectangle(panel.corner, panel.size).with(Stroke::new(FAINT.faint(0.5), 1.0)));
         let shows_whole_box = self.draw_box(panel, drawing);
         let weight = (30.0 / self.survey.views.len() as f64).clamp(0.12, 0.6);
         for &frame in &self.survey.views {
@@ -185,7 +186,7 @@ impl<'a> Map<'a> {
         let camera = self.camera(frame);
         let size = dvec2(f64::from(camera.width), f64::from(camera.height));
         let Some(ray) = camera.ray(0.5 * size) else { return };
-        let ahead = (self.survey.gaze.focus - ray.origin).dot(ray.direction);
+        let ahead = (self.survey.directions.focus - ray.origin).dot(ray.direction);
         let along = if ahead > 0.0 { ahead } else { 4.0 * self.frustum };
         let is_marked = self.marked.contains(&frame);
         let color = self.color(frame).faint(if is_marked { 0.9 } else { weight });
@@ -194,12 +195,12 @@ impl<'a> Map<'a> {
     }
 
     fn draw_focus(&self, panel: &Panel, drawing: &mut Drawing) {
-        let at = panel.place(self.survey.gaze.focus);
+        let at = panel.place(self.survey.directions.focus);
         let arm = 8.0;
         for [dx, dy] in [[arm, 0.0], [0.0, arm]] {
             let arm = dvec2(dx, dy);
-            drawing.push(Shape::line([at - arm, at + arm]).with(Stroke::new(GROUND, 4.0)));
-            drawing.push(Shape::line([at - arm, at + arm]).with(Stroke::new(INK, 1.6)));
+            drawing.push(DrawnShape::line([at - arm, at + arm]).with(Stroke::new(GROUND, 4.0)));
+            drawing.push(DrawnShape::line([at - arm, at + arm]).with(Stroke::new(INK, 1.6)));
         }
     }
 
@@ -217,7 +218,9 @@ impl<'a> Map<'a> {
             // It sees everything.
             let radius = 0.4 * self.frustum * panel.scale;
             drawing.push(
-                Shape::circle(panel.place(position), radius).filled(stroke.color.faint(0.18)).with(stroke),
+                DrawnShape::circle(panel.place(position), radius)
+                    .filled(stroke.color.faint(0.18))
+                    .with(stroke),
             );
         }
         let size = dvec2(f64::from(camera.width), f64::from(camera.height));
@@ -228,13 +231,13 @@ impl<'a> Map<'a> {
         let picture: Vec<DVec2> = ends.iter().map(|end| panel.place(*end)).collect();
         let fill = stroke.color.faint(0.18);
         if has_rims {
-            drawing.push(Shape::closed(picture).filled(fill).with(stroke));
+            drawing.push(DrawnShape::closed(picture).filled(fill).with(stroke));
         }
         for (ray, end) in rays.iter().zip(ends) {
             panel.line([ray.origin, end], stroke, drawing);
         }
         drawing.push(
-            Shape::circle(panel.place(position), if is_marked { 3.2 } else { 1.6 }).filled(stroke.color),
+            DrawnShape::circle(panel.place(position), if is_marked { 3.2 } else { 1.6 }).filled(stroke.color),
         );
     }
 
@@ -246,7 +249,7 @@ impl<'a> Map<'a> {
             let position = self.camera(frame).position();
             let mut name = self.dataset.frames[frame].name.rsplit('/').next().unwrap_or_default().to_owned();
             if !panel.shows(position) {
-                name += &format!(" ({} away)", length(position.distance(self.survey.gaze.focus)));
+                name += &format!(" ({} away)", length(position.distance(self.survey.directions.focus)));
             }
             let camera = panel.rim(position);
             let is_right = camera.x > panel.corner.x + 0.6 * panel.size.x;
@@ -279,7 +282,7 @@ impl<'a> Map<'a> {
             let number = number(color);
             if number > 0 {
                 let at = dvec2(x, 42.0);
-                drawing.push(Shape::rectangle(at, dvec2(11.0, 11.0)).filled(color));
+                drawing.push(DrawnShape::rectangle(at, dvec2(11.0, 11.0)).filled(color));
                 x = drawing.text(
                     at + dvec2(16.0, 10.0),
                     &format!("{number} {name}"),
@@ -297,7 +300,7 @@ impl<'a> Map<'a> {
             lines.push((Stroke::new(FAINT, 1.0).dashed(), name));
         }
         for (stroke, name) in lines {
-            drawing.push(Shape::line([dvec2(x, 47.0), dvec2(x + 18.0, 47.0)]).with(stroke));
+            drawing.push(DrawnShape::line([dvec2(x, 47.0), dvec2(x + 18.0, 47.0)]).with(stroke));
             x = drawing.text(dvec2(x + 23.0, 52.0), name, TEXT, INK, Anchor::Start) + 18.0;
         }
         drawing.text(dvec2(x, 52.0), "+ focus", TEXT, INK, Anchor::Start);
@@ -306,12 +309,12 @@ impl<'a> Map<'a> {
     }
 
     fn footnote(&self) -> String {
-        let gaze = &self.survey.gaze;
-        let focus = if gaze.meets { "the axes meet" } else { "the axes do not meet; the focus is" };
+        let directions = &self.survey.directions;
+        let focus = if directions.meets { "the axes meet" } else { "the axes do not meet; the focus is" };
         format!(
             "{focus} at {}, {} from the cameras; the box is {} wide",
-            point(gaze.focus, gaze.distance.median),
-            gaze.distance.tell(length),
+            point(directions.focus, directions.distance.median),
+            directions.distance.describe(length),
             length(2.0 * self.dataset.bounds.outer_half())
         )
     }

@@ -1,6 +1,6 @@
 //! Focal lengths, fields of view, principal points and lenses, and whether they agree.
 
-use super::{Finding, Scene, Spread};
+use super::{CameraSet, Diagnostic, Spread};
 use crate::camera::{Camera, Geometry, LensKind};
 use crate::support::format::{count, percent};
 use glam::{DVec2, dvec2};
@@ -35,7 +35,7 @@ const MOST_FOV_DEGREES: f64 = 150.0;
 const FAR_OFF: f64 = 0.25;
 
 impl Optics {
-    pub(super) fn of(scene: &Scene<'_>) -> Self {
+    pub(super) fn of(scene: &CameraSet<'_>) -> Self {
         let spread = |value: &dyn Fn(&Camera) -> f64| Spread::of(scene.cameras().map(value));
         let center_off = |axis: usize| spread(&|camera| center_off(camera)[axis]);
         Self {
@@ -47,7 +47,7 @@ impl Optics {
         }
     }
 
-    pub(super) fn findings(&self, scene: &Scene<'_>) -> Vec<Finding> {
+    pub(super) fn findings(&self, scene: &CameraSet<'_>) -> Vec<Diagnostic> {
         [odd_focal_lengths(scene), oblong_pixels(scene), odd_fields_of_view(scene), far_off_centers(scene)]
             .into_iter()
             .flatten()
@@ -89,7 +89,7 @@ fn is_flat(camera: &Camera) -> bool {
     camera.lens.geometry() == Geometry::Plane
 }
 
-fn odd_focal_lengths(scene: &Scene<'_>) -> Option<Finding> {
+fn odd_focal_lengths(scene: &CameraSet<'_>) -> Option<Diagnostic> {
     let mut odd = Vec::new();
     let mut told = None;
     let cameras: Vec<&Camera> = scene.cameras().collect();
@@ -109,7 +109,7 @@ fn odd_focal_lengths(scene: &Scene<'_>) -> Option<Finding> {
     }
     let (focal, middle) = told?;
     Some(
-        Finding::warning(format!(
+        Diagnostic::warning(format!(
             "{} of {} {} a focal length unlike the others of the same size: {:.1} px instead of {middle:.1} px ({:+.1} %) in \
              the first of {}; unless they were zoomed, correct their `fl_x` or drop them",
             odd.len(),
@@ -123,14 +123,14 @@ fn odd_focal_lengths(scene: &Scene<'_>) -> Option<Finding> {
     )
 }
 
-fn oblong_pixels(scene: &Scene<'_>) -> Option<Finding> {
+fn oblong_pixels(scene: &CameraSet<'_>) -> Option<Diagnostic> {
     let cameras: Vec<&Camera> = scene.cameras().collect();
     let ratio = |view: usize| cameras[view].focal_px.x / cameras[view].focal_px.y;
     let frames = scene.which(|view| (ratio(view) - 1.0).abs() > SQUARE);
     let first = (0..cameras.len()).find(|&view| (ratio(view) - 1.0).abs() > SQUARE)?;
     let camera = cameras[first];
     Some(
-        Finding::warning(format!(
+        Diagnostic::warning(format!(
             "pixels are not square in {}: the focal lengths are {:.1} px along x and {:.1} px along y, {:.1} % apart, with \
              {}x{} pixels, in {}; images that were stretched need no correction, otherwise check `fl_x`, `fl_y`, `w` and `h`",
             count(frames.len(), "frame"),
@@ -145,7 +145,7 @@ fn oblong_pixels(scene: &Scene<'_>) -> Option<Finding> {
     )
 }
 
-fn odd_fields_of_view(scene: &Scene<'_>) -> Option<Finding> {
+fn odd_fields_of_view(scene: &CameraSet<'_>) -> Option<Diagnostic> {
     let cameras: Vec<&Camera> = scene.cameras().collect();
     let is_odd = |view: usize| {
         let fov = fov_degrees(cameras[view]);
@@ -156,7 +156,7 @@ fn odd_fields_of_view(scene: &Scene<'_>) -> Option<Finding> {
     let frames = scene.which(is_odd);
     let fov = fov_degrees(cameras[first]);
     Some(
-        Finding::warning(format!(
+        Diagnostic::warning(format!(
             "the field of view is {:.1}° x {:.1}° in {}, outside of {LEAST_FOV_DEGREES}° to {MOST_FOV_DEGREES}°: the focal \
              length is {:.1} px with {}x{} pixels, in {}; check that `fl_x` and `w`, or the unit of `camera_angle_x` \
              (radians), are right",
@@ -172,14 +172,14 @@ fn odd_fields_of_view(scene: &Scene<'_>) -> Option<Finding> {
     )
 }
 
-fn far_off_centers(scene: &Scene<'_>) -> Option<Finding> {
+fn far_off_centers(scene: &CameraSet<'_>) -> Option<Diagnostic> {
     let cameras: Vec<&Camera> = scene.cameras().collect();
     let is_far = |view: usize| center_off(cameras[view]).abs().max_element() > FAR_OFF;
     let first = (0..cameras.len()).find(|&view| is_far(view))?;
     let frames = scene.which(is_far);
     let camera = cameras[first];
     Some(
-        Finding::warning(format!(
+        Diagnostic::warning(format!(
             "the principal point is far off the middle in {}: at {:.0}, {:.0} of {}x{} pixels ({} to the side) in {}; unless \
              the images were cropped, check `cx` and `cy` against `w` and `h`",
             count(frames.len(), "frame"),

@@ -1,7 +1,7 @@
 //! Single poses that look wrong: far from the others, turned away, or given twice.
 
-use super::gaze::Gaze;
-use super::{Finding, Scene, Spread};
+use super::view_directions::ViewDirections;
+use super::{CameraSet, Diagnostic, Spread};
 use crate::camera::Geometry;
 use crate::capture::dataset::Dataset;
 use crate::support::format::{count, length};
@@ -28,7 +28,7 @@ const TURNED_AWAY: f64 = 2.0;
 const SAME: f64 = 1e-6;
 
 /// Cameras that are far from all others, or look elsewhere.
-pub(super) fn outliers(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
+pub(super) fn outliers(scene: &CameraSet<'_>, directions: &ViewDirections) -> Vec<Diagnostic> {
     if scene.count() < LEAST_VIEWS {
         return Vec::new();
     }
@@ -47,7 +47,7 @@ pub(super) fn outliers(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
             length(positions[first].distance(middle)),
             length(typical),
         );
-        findings.push(Finding::warning(message).about(frames));
+        findings.push(Diagnostic::warning(message).about(frames));
     }
     let jumps: Vec<usize> = jumps(&positions)
         .into_iter()
@@ -64,19 +64,19 @@ pub(super) fn outliers(scene: &Scene<'_>, gaze: &Gaze) -> Vec<Finding> {
             length(step(jumps[0])),
             length(Spread::of((1..positions.len()).map(step)).median),
         );
-        findings.push(Finding::warning(message).about(frames));
+        findings.push(Diagnostic::warning(message).about(frames));
     }
-    let away: Vec<usize> = away(scene, gaze).into_iter().filter(|view| !far.contains(view)).collect();
+    let away: Vec<usize> = away(scene, directions).into_iter().filter(|view| !far.contains(view)).collect();
     if is_few(&away, scene) {
         let frames = frames(scene, &away);
         let names = scene.names(&frames);
         let message = format!(
             "{} turned away from what {:.0} % of the cameras look at, by {:.0}° in {names}; check or drop the pose",
             are(&away),
-            100.0 * gaze.seeing,
-            gaze.off_rad[away[0]].to_degrees(),
+            100.0 * directions.seeing,
+            directions.off_rad[away[0]].to_degrees(),
         );
-        findings.push(Finding::warning(message).about(frames));
+        findings.push(Diagnostic::warning(message).about(frames));
     }
     findings
 }
@@ -85,16 +85,16 @@ fn are(views: &[usize]) -> String {
     format!("{} {}", count(views.len(), "camera"), if views.len() == 1 { "is" } else { "are" })
 }
 
-fn frames(scene: &Scene<'_>, views: &[usize]) -> Vec<usize> {
+fn frames(scene: &CameraSet<'_>, views: &[usize]) -> Vec<usize> {
     views.iter().map(|&view| scene.views[view]).collect()
 }
 
-fn is_few(views: &[usize], scene: &Scene<'_>) -> bool {
+fn is_few(views: &[usize], scene: &CameraSet<'_>) -> bool {
     !views.is_empty() && views.len() as f64 <= f64::max(1.0, FEW * scene.count() as f64)
 }
 
 /// Whether the frames before and after are of the same folder, and so perhaps of one sequence.
-fn is_within_folder(scene: &Scene<'_>, view: usize) -> bool {
+fn is_within_folder(scene: &CameraSet<'_>, view: usize) -> bool {
     let folder =
         |view: usize| scene.dataset.frames[scene.views[view]].name.rsplit_once('/').map(|parts| parts.0);
     folder(view - 1) == folder(view) && folder(view) == folder(view + 1)
@@ -125,24 +125,24 @@ fn jumps(positions: &[DVec3]) -> Vec<usize> {
     (1..positions.len() - 1).filter(is_jump).collect()
 }
 
-fn away(scene: &Scene<'_>, gaze: &Gaze) -> Vec<usize> {
-    if !gaze.meets || gaze.seeing < NEARLY_ALL {
+fn away(scene: &CameraSet<'_>, directions: &ViewDirections) -> Vec<usize> {
+    if !directions.meets || directions.seeing < NEARLY_ALL {
         return Vec::new();
     }
     let cameras: Vec<_> = scene.cameras().collect();
     let is_away = |&view: &usize| {
         let axis = &scene.axes[view];
-        let distance = axis.origin.distance(gaze.focus).max(f64::MIN_POSITIVE);
+        let distance = axis.origin.distance(directions.focus).max(f64::MIN_POSITIVE);
         let half_view = (axis.half_width_at(distance) / distance).atan();
         // Lenses that see all around may point anywhere.
         let points = cameras[view].lens.geometry() != Geometry::Angles;
-        points && gaze.off_rad[view] > TURNED_AWAY * half_view
+        points && directions.off_rad[view] > TURNED_AWAY * half_view
     };
     (0..scene.count()).filter(is_away).collect()
 }
 
 /// Pairs of frames with different images and the same pose; of several with one pose, each with the first.
-pub(super) fn repeated(scene: &Scene<'_>) -> Vec<[usize; 2]> {
+pub(super) fn repeated(scene: &CameraSet<'_>) -> Vec<[usize; 2]> {
     let extent = scene.extent();
     let cameras: Vec<_> = scene.cameras().collect();
     // All cameras at one place is another matter.
@@ -172,7 +172,7 @@ pub(super) fn about_repeated(
     dataset: &Dataset,
     pairs: &[[usize; 2]],
     differ: Option<bool>,
-) -> Option<Finding> {
+) -> Option<Diagnostic> {
     let &[first, second] = pairs.first()?;
     let mut frames = pairs.concat();
     frames.sort_unstable();
@@ -186,13 +186,13 @@ pub(super) fn about_repeated(
         if pairs.len() > 1 { ", for example" } else { "" },
     );
     Some(match differ {
-        Some(true) => Finding::warning(format!(
+        Some(true) => Diagnostic::warning(format!(
             "{where_they_are}, and their pictures differ; unless the scene moves or the light changes, correct or drop \
              the wrong pose"
         ))
         .about(frames),
-        Some(false) => Finding::note(format!("{where_they_are}; their pictures look the same")),
-        None => Finding::note(format!(
+        Some(false) => Diagnostic::note(format!("{where_they_are}; their pictures look the same")),
+        None => Diagnostic::note(format!(
             "{where_they_are}; unless the camera stood still or the scene moves, one of the poses is wrong"
         )),
     })

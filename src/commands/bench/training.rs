@@ -1,7 +1,7 @@
 //! `nerf bench training`: PSNR of test views against seconds of training.
 
 mod curve;
-mod picture;
+mod psnr_plot;
 
 use crate::cli::bench::Training;
 use crate::commands::Session;
@@ -11,7 +11,7 @@ use curve::{Curve, follow};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::config::schedule::Budget;
 use nerf::field::Field;
-use nerf::field::train::Trainer;
+use nerf::field::trainer::Trainer;
 use nerf::gpu::Gpu;
 use nerf::run::results::{
     circumstances, joined, markdown, optional, quoted, write_csv, write_json, write_text,
@@ -24,20 +24,20 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What the seconds of a training are.
+/// What the seconds of training are.
 const CLOCK: &str = "training alone, without loading, compiling and measuring; the steps of one block in sixteen wait \
                      for the device each, so that their stages can be timed";
 
-/// One training to be measured.
-struct Entry {
+/// One run to be measured.
+struct PlannedRun {
     /// The stem of its config's file.
     config: String,
     resolved: Resolved,
 }
 
-/// One training that was measured.
+/// One run that was measured.
 #[derive(Serialize)]
-struct Run {
+struct MeasuredRun {
     config: String,
     seed: u32,
     /// Decoding the photos and putting them on the device.
@@ -53,7 +53,7 @@ struct Run {
 }
 
 /// What is the same in all runs.
-struct Course<'a> {
+struct Benchmark<'a> {
     gpu: Arc<Gpu>,
     dataset: &'a Dataset,
     views: usize,
@@ -61,33 +61,33 @@ struct Course<'a> {
 
 pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
     let dataset = Dataset::open(&args.dataset, &OpenOptions::default())?;
-    session.remarks.notes(&dataset);
+    session.console.notes(&dataset);
     ensure!(!dataset.test.is_empty(), "the dataset has no test views to measure; a benchmark needs some");
     let gpu = session.open_gpu()?;
-    let entries = entries(args, &dataset, &gpu)?;
+    let planned = plan(args, &dataset, &gpu)?;
     writable_folder(&args.out)?;
-    let course = Course { gpu, dataset: &dataset, views: args.views as usize };
+    let benchmark = Benchmark { gpu, dataset: &dataset, views: args.views as usize };
     let about = joined(
-        circumstances(&course.gpu),
+        circumstances(&benchmark.gpu),
         json!({
             "dataset": args.dataset.display().to_string(),
             "train_views": dataset.train.len(),
             "test_views": dataset.test.len(),
-            "budget": entries.first().map(|entry| entry.resolved.about.budget),
+            "budget": planned.first().map(|run| run.resolved.metadata.budget),
             "clock": CLOCK,
         }),
     );
     let mut runs = Vec::new();
-    for (number, entry) in entries.iter().enumerate() {
-        let seed = entry.resolved.about.config.seed;
-        session.remarks.say(&format!(
+    for (number, next) in planned.iter().enumerate() {
+        let seed = next.resolved.metadata.config.seed;
+        session.console.say(&format!(
             "run {} of {}: {}, seed {seed}",
             number + 1,
-            entries.len(),
-            entry.config
+            planned.len(),
+            next.config
         ));
-        let run = course.run(entry, session);
-        runs.push(run.with_context(|| format!("{}, seed {seed}", entry.config))?);
+        let run = benchmark.run(next, session);
+        runs.push(run.with_context(|| format!("{}, seed {seed}", next.config))?);
         // After every run: a benchmark that is interrupted keeps what it has.
         write(&args.out, &about, &runs)?;
     }
@@ -95,7 +95,7 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
 }
 
 /// Every config with every seed, all checked before any of them is run.
-fn entries(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<Entry>> {
+fn plan(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<PlannedRun>> {
     let mut configs = Vec::new();
     for path in &args.config {
         let stem =
@@ -119,7 +119,7 @@ fn entries(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<Entry>> 
     let dataset_name = args.dataset.display().to_string();
     let budget = Budget { steps: args.steps, seconds: args.seconds };
     let each = configs.iter().flat_map(|config| seeds.iter().map(move |&seed| (config, seed)));
-    let entry = |((name, config), seed): (&(String, Option<&Path>), Option<u32>)| {
+    let run = |((name, config), seed): (&(String, Option<&Path>), Option<u32>)| {
         let options = TrainOptions {
             dataset: dataset_name.clone(),
             config: config.map(Path::to_owned),
@@ -128,15 +128,15 @@ fn entries(args: &Training, dataset: &Dataset, gpu: &Gpu) -> Result<Vec<Entry>> 
             budget,
             ..TrainOptions::default()
         };
-        Ok(Entry { config: name.clone(), resolved: Resolved::new_run(&options, dataset, gpu)? })
+        Ok(PlannedRun { config: name.clone(), resolved: Resolved::new_run(&options, dataset, gpu)? })
     };
-    each.map(entry).collect()
+    each.map(run).collect()
 }
 
-impl Course<'_> {
+impl Benchmark<'_> {
     /// Trains and measures once.
-    fn run(&self, entry: &Entry, session: &Session<'_>) -> Result<Run> {
-        let resolved = &entry.resolved;
+    fn run(&self, planned: &PlannedRun, session: &Session<'_>) -> Result<MeasuredRun> {
+        let resolved = &planned.resolved;
         let mut narrator = session.narrator();
         resolved.check_memory(&self.gpu, self.dataset, &mut narrator)?;
         let clock = Instant::now();
@@ -149,11 +149,11 @@ impl Course<'_> {
         let mut evaluator = evaluator.context("the dataset has no test views")?;
         let compile_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let stepper = Stepper::new(trainer, StepClock::new(&resolved.about, 0.0));
-        let curve = follow(stepper, &mut evaluator, &resolved.test, session.remarks)?;
-        let settings = resolved.about.config.clone();
-        Ok(Run {
-            config: entry.config.clone(),
+        let stepper = Stepper::new(trainer, StepClock::new(&resolved.metadata, 0.0));
+        let curve = follow(stepper, &mut evaluator, &resolved.test, session.console)?;
+        let settings = resolved.metadata.config.clone();
+        Ok(MeasuredRun {
+            config: planned.config.clone(),
             seed: settings.seed,
             load_seconds,
             compile_seconds,
@@ -164,7 +164,7 @@ impl Course<'_> {
     }
 }
 
-fn write(folder: &Path, about: &Value, runs: &[Run]) -> Result<()> {
+fn write(folder: &Path, about: &Value, runs: &[MeasuredRun]) -> Result<()> {
     let whole = joined(about.clone(), json!({ "configs": summaries(runs), "runs": runs }));
     write_json(&folder.join("training.json"), &whole)?;
     let rows = runs.iter().flat_map(|run| run.curve.points.iter().map(move |point| (run, point)));
@@ -183,11 +183,11 @@ fn write(folder: &Path, about: &Value, runs: &[Run]) -> Result<()> {
         )
     });
     write_csv(&folder.join("training.csv"), "config,seed,step,seconds,loss,eval_psnr,eval_ssim,views", rows)?;
-    write_text(&folder.join("training.svg"), &picture::picture(runs)?)
+    write_text(&folder.join("training.svg"), &psnr_plot::plot(runs)?)
 }
 
 /// The runs of one config.
-fn by_config(runs: &[Run]) -> impl Iterator<Item = &[Run]> {
+fn by_config(runs: &[MeasuredRun]) -> impl Iterator<Item = &[MeasuredRun]> {
     runs.chunk_by(|a, b| a.config == b.config)
 }
 
@@ -199,9 +199,9 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, Option<f64>) {
     (mean, (count > 1.0).then(|| (squares / (count - 1.0)).sqrt()))
 }
 
-fn summaries(runs: &[Run]) -> Vec<Value> {
-    let summary = |runs: &[Run]| {
-        let mean = |value: fn(&Run) -> f64| spread(runs.iter().map(value)).0;
+fn summaries(runs: &[MeasuredRun]) -> Vec<Value> {
+    let summary = |runs: &[MeasuredRun]| {
+        let mean = |value: fn(&MeasuredRun) -> f64| spread(runs.iter().map(value)).0;
         let (psnr, psnr_spread) = spread(runs.iter().map(|run| run.curve.psnr));
         json!({
             "config": runs[0].config,
@@ -220,7 +220,7 @@ fn summaries(runs: &[Run]) -> Vec<Value> {
     by_config(runs).map(summary).collect()
 }
 
-fn table(runs: &[Run]) -> String {
+fn table(runs: &[MeasuredRun]) -> String {
     let header = [
         "config",
         "seeds",
@@ -233,8 +233,8 @@ fn table(runs: &[Run]) -> String {
         "compiling, s",
         "measuring, s",
     ];
-    let row = |runs: &[Run]| {
-        let mean = |value: fn(&Run) -> f64| spread(runs.iter().map(value)).0;
+    let row = |runs: &[MeasuredRun]| {
+        let mean = |value: fn(&MeasuredRun) -> f64| spread(runs.iter().map(value)).0;
         let (psnr, deviation) = spread(runs.iter().map(|run| run.curve.psnr));
         vec![
             runs[0].config.clone(),

@@ -1,8 +1,8 @@
 //! What is wrong with a dataset as it was read.
 
-use crate::flags::told;
+use crate::flags::with_flags;
 use nerf::capture::dataset::Dataset;
-use nerf::capture::health::Finding;
+use nerf::capture::diagnostics::Diagnostic;
 use nerf::run::Estimate;
 
 /// Number of images that are there.
@@ -10,28 +10,28 @@ pub(super) fn found(dataset: &Dataset) -> usize {
     dataset.listed - dataset.missing.len()
 }
 
-/// What keeps a training from beginning, and what the reader remarked.
-pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Finding> {
+/// What keeps training from beginning, and what the reader noted.
+pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Diagnostic> {
     let mut problems = Vec::new();
-    problems.extend(dataset.damaged.iter().map(Finding::error));
+    problems.extend(dataset.damaged.iter().map(Diagnostic::error));
     if found(dataset) == 0 && problems.is_empty() {
-        problems.push(Finding::error(nothing_found(dataset)));
+        problems.push(Diagnostic::error(nothing_found(dataset)));
     } else if found(dataset) > 0 && dataset.train.is_empty() {
-        problems.push(Finding::error(
+        problems.push(Diagnostic::error(
             "there is no frame to train on: every frame is in the test or validation split; name the folder or the \
              file that lists the training frames",
         ));
     }
-    problems.extend(dataset.notes.iter().map(Finding::from));
+    problems.extend(dataset.notes.iter().cloned());
     problems
 }
 
 /// What does not fit into the memory, and what the estimate assumes.
-pub(super) fn of_memory(estimate: &Estimate) -> Vec<Finding> {
+pub(super) fn of_memory(estimate: &Estimate) -> Vec<Diagnostic> {
     let assumed = "there is no adapter on this machine, which training needs: the memory is that of a GPU with the \
                    default settings; see `nerf adapters`";
-    let excess = estimate.excess.iter().map(|error| Finding::error(told(error)));
-    excess.chain(estimate.adapter.is_none().then(|| Finding::note(assumed))).collect()
+    let excess = estimate.excess.iter().map(|error| Diagnostic::error(with_flags(error)));
+    excess.chain(estimate.adapter.is_none().then(|| Diagnostic::note(assumed))).collect()
 }
 
 fn nothing_found(dataset: &Dataset) -> String {

@@ -7,7 +7,7 @@ use crate::field::layout::{DENSITY_OUTPUTS, Layer};
 use crate::field::shared::Tile;
 use crate::field::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::kernel::Kernel;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
@@ -18,17 +18,17 @@ const D_COLOR_HIDDEN: [&str; 4] =
     ["d_color_hidden_1", "d_color_hidden_2", "d_color_hidden_3", "d_color_hidden_4"];
 
 /// Gradients of activations, and partial sums of those of the weights.
-pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let rows = plan.capacity.kept + SPARE_ROWS;
-    let mut demands = vec![
+    let mut buffers = vec![
         plan.tensor("d_raw_color", Element::Vec4, rows),
         plan.tensor("d_density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
         plan.tensor("d_density_hidden", Element::Vec4, rows * plan.config.network.width / 4),
         plan.tensor("d_encoding", Element::Vec4, rows * plan.layout.encoding() / 4),
         plan.tensor("d_weight_chunks", Element::Vec4, plan.chunks * plan.layout.quads),
     ];
-    demands.extend(plan.color_hidden(&D_COLOR_HIDDEN, rows));
-    demands
+    buffers.extend(plan.color_hidden(&D_COLOR_HIDDEN, rows));
+    buffers
 }
 
 /// Gradients of all activations, from the colour back to the encoding.

@@ -5,7 +5,7 @@ use crate::field::layout::COLOR_INPUTS;
 use crate::field::march::{SPARE_ROWS, Scanned, scan};
 use crate::field::{Link, Plan, Workspace, dispatch, viewing};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
@@ -15,7 +15,7 @@ pub const COLOR_HIDDEN: [&str; 4] = ["color_hidden_1", "color_hidden_2", "color_
 
 /// How many samples get colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Selection {
+pub enum SelectionMode {
     /// Those above the weight floor, and some of the others.
     Training,
     /// Of a view's rays, one for every [`crate::field::Rounds`].
@@ -23,26 +23,28 @@ pub enum Selection {
 }
 
 /// The kept samples and the colour network's activations.
-pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let rows = plan.capacity.kept + SPARE_ROWS;
-    let mut demands = vec![
+    let mut buffers = vec![
         plan.tensor("chosen", Element::Vec4, plan.capacity.samples),
-        plan.tensor("kept_rows", Element::Pair, rows),
+        plan.tensor("kept_rows", Element::Vec2u, rows),
         plan.tensor("color_input", Element::Vec4, rows * COLOR_INPUTS / 4),
         plan.tensor("color", Element::Vec4, rows),
     ];
-    demands.extend(plan.color_hidden(&COLOR_HIDDEN, rows));
-    demands
+    buffers.extend(plan.color_hidden(&COLOR_HIDDEN, rows));
+    buffers
 }
 
 /// Selects, packs and colours.
 ///
 /// # Errors
 /// When a kernel cannot be built.
-pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: Selection) -> Result<Vec<Stage>> {
+pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: SelectionMode) -> Result<Vec<Stage>> {
     let (select, packing) = match selection {
-        Selection::Training => (plan.stage(gpu, workspace, &Link::of("select"), dispatch::RAYS)?, "training"),
-        Selection::View => (viewing::select(gpu, plan, workspace)?, "view"),
+        SelectionMode::Training => {
+            (plan.stage(gpu, workspace, &Link::of("select"), dispatch::RAYS)?, "training")
+        }
+        SelectionMode::View => (viewing::select(gpu, plan, workspace)?, "view"),
     };
     let kept = plan.stage(gpu, workspace, &Link::of("kept").with("packing", packing), dispatch::RAYS)?;
     let input = plan.stage(gpu, workspace, &Link::of("color input"), dispatch::KEPT)?;

@@ -3,25 +3,25 @@
 use super::march::SPARE_ROWS;
 use crate::field::{Capacity, Link, Plan, RayResult, Workspace, dispatch};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
 
 /// What it takes of kept samples and rays, what the rays show, and the gradients of colours and log-densities.
-pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let Capacity { rays, samples, kept } = plan.capacity;
     let rows = kept + SPARE_ROWS;
-    let mut demands = vec![
+    let mut buffers = vec![
         plan.tensor("kept_steps", Element::Vec4, 2 * rows),
-        Demand::storage::<f32>("ray_tails", rays),
-        Demand::storage::<RayResult>("ray_results", rays),
+        BufferSpec::storage::<f32>("ray_tails", rays),
+        BufferSpec::storage::<RayResult>("ray_results", rays),
         plan.tensor("d_color", Element::Vec4, rows),
     ];
     if plan.needs_distances() {
-        demands.push(Demand::storage::<f32>("sample_distances", samples));
+        buffers.push(BufferSpec::storage::<f32>("sample_distances", samples));
     }
-    demands
+    buffers
 }
 
 /// The kernel; `weights` asks for the samples' weights too.

@@ -5,14 +5,14 @@ use crate::field::march::SPARE_ROWS;
 use crate::field::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::kernel::{Kernel, Resource};
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
 
 /// The activations of the marched samples.
-pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let rows = plan.capacity.samples + SPARE_ROWS;
     vec![
         plan.tensor("encoding", Element::Vec4, rows * plan.layout.encoding() / 4),

@@ -2,7 +2,7 @@
 
 use crate::field::{Capacity, Counters, Link, Plan, Step, Workspace, dispatch};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
@@ -11,15 +11,15 @@ use anyhow::Result;
 pub const SPARE_ROWS: usize = 1024;
 
 /// Rays, their spans and the samples.
-pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let Capacity { rays, samples, .. } = plan.capacity;
     vec![
-        Demand::uniform::<Step>("step"),
-        Demand::uniform_storage::<Counters>("counters", 1),
-        Demand::indirect("dispatch", dispatch::COUNT * 4),
-        Demand::storage::<u32>("ray_steps", rays * plan.step_words()),
-        Demand::storage::<[u32; 2]>("ray_spans", rays),
-        Demand::storage::<[u32; 2]>("kept_spans", rays),
+        BufferSpec::uniform::<Step>("step"),
+        BufferSpec::uniform_storage::<Counters>("counters", 1),
+        BufferSpec::indirect("dispatch", dispatch::COUNT * 4),
+        BufferSpec::storage::<u32>("ray_steps", rays * plan.step_words()),
+        BufferSpec::storage::<[u32; 2]>("ray_spans", rays),
+        BufferSpec::storage::<[u32; 2]>("kept_spans", rays),
         plan.tensor("ray_lines", Element::Vec4, 2 * rays),
         plan.tensor("samples", Element::Vec4, samples + SPARE_ROWS),
     ]
@@ -27,7 +27,7 @@ pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
 
 /// How far rays are marched at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
+pub enum MarchExtent {
     /// To the end of the box.
     Whole,
     /// From where the round before ended, up to as many samples as the round allows: a
@@ -35,7 +35,7 @@ pub enum Extent {
     Round,
 }
 
-impl Extent {
+impl MarchExtent {
     fn variant(self) -> &'static str {
         match self {
             Self::Whole => "whole",
@@ -49,7 +49,7 @@ impl Extent {
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, jitter: bool) -> Result<Vec<Stage>> {
-    stages_over(gpu, plan, workspace, jitter, Extent::Whole)
+    stages_over(gpu, plan, workspace, jitter, MarchExtent::Whole)
 }
 
 /// As [`stages`], over an extent of the rays.
@@ -61,12 +61,12 @@ pub fn stages_over(
     plan: &Plan,
     workspace: &Workspace,
     jitter: bool,
-    extent: Extent,
+    extent: MarchExtent,
 ) -> Result<Vec<Stage>> {
     let jitter = if jitter { "on" } else { "off" };
     let over_rays = |label: &str| {
         let link = Link::of(label).with("jitter", jitter).with("extent", extent.variant());
-        let link = if extent == Extent::Round { link.with("distance", "depth") } else { link };
+        let link = if extent == MarchExtent::Round { link.with("distance", "depth") } else { link };
         plan.stage(gpu, workspace, &link, dispatch::RAYS)
     };
     Ok(vec![over_rays("march")?, scan(gpu, plan, workspace, Scanned::Samples)?, over_rays("samples")?])

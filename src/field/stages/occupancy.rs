@@ -3,7 +3,7 @@
 use super::density;
 use crate::field::{Link, Plan, Workspace};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use anyhow::Result;
 
@@ -21,8 +21,11 @@ pub struct Update {
 }
 
 /// What only the update needs, for `visible` cells that can hold something.
-pub(crate) fn demands(visible: usize) -> Vec<Demand> {
-    vec![Demand::storage::<f32>("occupancy_mean", 1), Demand::storage::<u32>("visible_cells", visible.max(1))]
+pub(crate) fn buffers(visible: usize) -> Vec<BufferSpec> {
+    vec![
+        BufferSpec::storage::<f32>("occupancy_mean", 1),
+        BufferSpec::storage::<u32>("visible_cells", visible.max(1)),
+    ]
 }
 
 impl Update {

@@ -1,25 +1,25 @@
 //! From gradients to parameters: their range, the scatter into the table, and Adam, group by group.
 
 use crate::config::Accumulation;
-use crate::field::parameters::{GROUPS, Kernel, Learning};
+use crate::field::parameters::{AdamKernel, GROUPS, Learning};
 use crate::field::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::kernel::Bound;
 use crate::gpu::pass::Stage;
-use crate::gpu::tensor::{Element, Memory};
+use crate::gpu::tensor::{Element, TensorMemory};
 use anyhow::Result;
 
 /// The gradients of the parameters, and their range.
-pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
+pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let ordered = plan.accumulation == Accumulation::Ordered;
-    let memory = if ordered { plan.memory } else { Memory::Buffers };
+    let memory = if ordered { plan.memory } else { TensorMemory::Buffers };
     // Integers of 64 bits take twice the room of floats.
     let words = if plan.accumulation == Accumulation::Fixed { 2 } else { 1 };
     vec![
-        Demand::tensor("d_table", Element::Vec2, plan.layout.entries * words, memory),
-        Demand::storage::<[f32; 4]>("d_weights", plan.layout.quads),
-        Demand::storage::<u32>("gradient_range", 3),
+        BufferSpec::tensor("d_table", Element::Vec2, plan.layout.entries * words, memory),
+        BufferSpec::storage::<[f32; 4]>("d_weights", plan.layout.quads),
+        BufferSpec::storage::<u32>("gradient_range", 3),
     ]
 }
 
@@ -69,8 +69,8 @@ fn adam(
     let count = plan.arrays().find(|array| array.name == name).map_or(0, |array| array.count());
     Ok(match learning.kernel {
         // Two entries per thread.
-        Kernel::Table => Stage::wide(bind(Link::of_file(&label, "adam_table"), &[])?, count / 2 / 2),
-        Kernel::Dense(gradients) => {
+        AdamKernel::Table => Stage::wide(bind(Link::of_file(&label, "adam_table"), &[])?, count / 2 / 2),
+        AdamKernel::Dense(gradients) => {
             let [first, second] = learning.moments();
             let renamed = [
                 ("parameters", name),

@@ -2,13 +2,13 @@
 
 use crate::field::{Link, Plan, RayTarget, Workspace, dispatch, records};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use anyhow::Result;
 
 /// What the rays should show.
-pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
-    vec![Demand::storage::<RayTarget>("ray_targets", plan.capacity.rays)]
+pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
+    vec![BufferSpec::storage::<RayTarget>("ray_targets", plan.capacity.rays)]
 }
 
 /// Draws the rays of a step, from `cameras` cameras.
@@ -16,6 +16,6 @@ pub(crate) fn demands(plan: &Plan) -> Vec<Demand> {
 /// # Errors
 /// When the kernel cannot be built.
 pub fn stage(gpu: &Gpu, plan: &Plan, workspace: &Workspace, cameras: usize) -> Result<Stage> {
-    let link = Link::of("rays").part(records::NAME, workspace.banks_part()?).count("CAMERA_COUNT", cameras);
+    let link = Link::of("rays").part(records::NAME, workspace.pages_part()?).count("CAMERA_COUNT", cameras);
     plan.stage(gpu, workspace, &link, dispatch::RAYS)
 }

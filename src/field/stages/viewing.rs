@@ -1,8 +1,8 @@
 //! What only rendering needs: its rays and their compositing.
 
-use crate::field::{Camera, Link, Plan, Progress, Workspace, dispatch};
+use crate::field::{DeviceCamera, Link, Plan, Progress, Workspace, dispatch};
 use crate::gpu::Gpu;
-use crate::gpu::demand::Demand;
+use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
@@ -12,16 +12,16 @@ pub type Pixel = [f32; 5];
 
 /// The camera, the state of the rays and the pixels of a band.
 #[must_use]
-pub fn demands(plan: &Plan) -> Vec<Demand> {
+pub fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let (rays, band) = (plan.capacity.rays, plan.rounds.band);
     vec![
-        Demand::uniform::<Camera>("view_camera"),
-        Demand::uniform_storage::<Progress>("progress", 1),
-        Demand::storage::<[u32; 2]>("view_slots", rays),
-        Demand::storage::<[u32; 3]>("view_rays", rays),
+        BufferSpec::uniform::<DeviceCamera>("view_camera"),
+        BufferSpec::uniform_storage::<Progress>("progress", 1),
+        BufferSpec::storage::<[u32; 2]>("view_slots", rays),
+        BufferSpec::storage::<[u32; 3]>("view_rays", rays),
         plan.tensor("ray_states", Element::Vec4, 2 * rays),
-        Demand::storage::<f32>("sample_distances", plan.capacity.samples),
-        Demand::storage::<Pixel>("view_pixels", band),
+        BufferSpec::storage::<f32>("sample_distances", plan.capacity.samples),
+        BufferSpec::storage::<Pixel>("view_pixels", band),
     ]
 }
 

@@ -1,4 +1,4 @@
-//! The curves of a training.
+//! The curves of a training run.
 
 use crate::run::log::{Interval, Log, Steps};
 use crate::support::chart::{Axis, Chart, Mark, Series};

@@ -3,7 +3,7 @@
 use super::colormap::{VIRIDIS, gradient};
 use super::curves::SIZE;
 use super::pictures::nearness;
-use super::views::TestViews;
+use super::test_views::TestViews;
 use crate::run::depths::{Bin, Depths, NEAR};
 use crate::support::chart::{Axis, Chart, Mark, Series};
 use crate::support::format::percent;
@@ -33,7 +33,7 @@ pub(super) fn scale(views: &TestViews) -> Markup {
     }
 }
 
-/// The opacity by distance and the near share, or why they are not told.
+/// The opacity by distance and the near share, or why they are not known.
 pub(super) fn section(views: &TestViews) -> Result<Markup> {
     let depths = views.depths().filter(|depths| !depths.distribution().is_empty());
     let Some(depths) = depths else {

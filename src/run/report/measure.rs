@@ -1,7 +1,7 @@
 //! Measuring test views for the page.
 
 use super::pictures::{Pair, Pictures};
-use super::views::TestViews;
+use super::test_views::TestViews;
 use crate::capture::dataset::spread_order;
 use crate::run::{Compared, Evaluator, Observer};
 use anyhow::Result;

@@ -2,7 +2,7 @@
 
 use super::colormap::{INFERNO, gradient};
 use super::pictures::{ERROR_SCALE, LONGEST_SIDE};
-use super::views::{EVENLY_SPACED, Row, TestViews, WORST};
+use super::test_views::{EVENLY_SPACED, Row, TestViews, WORST};
 use super::{Report, curves, distances, time};
 use crate::run::depths::{Depths, fog};
 use crate::run::log::Start;
@@ -84,7 +84,7 @@ fn latest<'a, T>(report: &'a Report, value: impl Fn(&'a Start) -> Option<T>) -> 
 /// What a reader must know before the numbers.
 fn warnings(report: &Report) -> Markup {
     let (skipped, damaged) = (report.log.skipped(), report.log.damaged);
-    let fog = report.outcome().and_then(|outcome| fog(outcome.near_share?));
+    let fog = report.summary().and_then(|summary| fog(summary.near_share?));
     html! {
         @if skipped > 0 {
             p.warning {
@@ -96,7 +96,7 @@ fn warnings(report: &Report) -> Markup {
         @if let Some(fog) = fog { p.warning { strong { "Fog: " } (fog) "." } }
         @if report.facts.is_done == Some(false) {
             p.warning {
-                strong { "The training was interrupted before its end. " }
+                strong { "The run was interrupted before its end. " }
                 "Resumed in its folder, it goes on from the last checkpoint."
             }
         }
@@ -116,12 +116,12 @@ fn warnings(report: &Report) -> Markup {
 fn figures(report: &Report) -> Markup {
     let log = &report.log;
     let mut figures: Vec<(String, String)> = Vec::new();
-    if let Some(outcome) = report.outcome() {
-        let of = outcome.measured();
-        figures.push((format!("{:.2} dB", outcome.psnr), format!("PSNR of {of}")));
-        figures.push((format!("{:.4}", outcome.ssim), format!("SSIM of {of}")));
+    if let Some(summary) = report.summary() {
+        let of = summary.measured();
+        figures.push((format!("{:.2} dB", summary.psnr), format!("PSNR of {of}")));
+        figures.push((format!("{:.4}", summary.ssim), format!("SSIM of {of}")));
         let near =
-            outcome.near_share.map(|share| (percent(share), "of pixels near: a sign of fog".to_owned()));
+            summary.near_share.map(|share| (percent(share), "of pixels near: a sign of fog".to_owned()));
         figures.extend(near);
     } else if let Some(psnr) = log.steps.iter().rev().find_map(|row| row.psnr) {
         figures.push((format!("{psnr:.2} dB"), "PSNR of the rays trained on".to_owned()));
@@ -146,7 +146,7 @@ fn charts(report: &Report) -> Result<Markup> {
     Ok(html! {
         @if !drawn.is_empty() {
             section {
-                h2 { "Course" }
+                h2 { "Training curves" }
                 div.charts { @for svg in &drawn { figure { (PreEscaped(svg)) } } }
             }
         }
@@ -183,7 +183,7 @@ fn gallery(views: &TestViews, hdr: bool) -> Markup {
             @if hdr { " Linear light is clamped to 0…1 and sRGB-encoded, for the pictures and for the scores." }
             @if views.left_out > 0 {
                 " " (views.left_out) (plural(views.left_out as u64, " more was", " more were"))
-                " left out, because measuring takes at most a tenth of the training's time; "
+                " left out, because measuring takes at most a tenth of the training time; "
                 code { "nerf eval RUN DATASET" } " measures all, and " code { "nerf report RUN" } " shows them."
             }
             @if !views.missing.is_empty() {

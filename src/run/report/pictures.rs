@@ -1,7 +1,7 @@
 //! Small pictures of a view, as `data:` addresses: the rendering and its depth, the photo, and where they differ.
 
 use super::colormap::{INFERNO, VIRIDIS, color};
-use crate::photo::color::quantised;
+use crate::photo::color_space::quantised;
 use anyhow::{Context, Result};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

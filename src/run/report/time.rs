@@ -51,7 +51,7 @@ fn table_of_stages(stages: &Stages) -> Markup {
 fn table_of_costs(once: &[(String, f64)]) -> Markup {
     html! {
         table.costs {
-            caption { "Paid once, outside of the training's seconds" }
+            caption { "Paid once, outside of the training time" }
             thead { tr { th { "what" } th.number { "time" } } }
             tbody {
                 @for (what, seconds) in once {

@@ -1,17 +1,17 @@
 //! The end of a session: the test views are measured, and the page about the run is written.
 
 use super::{TrainingEnd, TrainingSession};
-use crate::field::checkpoint::About;
+use crate::field::checkpoint::Metadata;
 use crate::run::event::Observer;
 use crate::run::log::{self, LogRow};
 use crate::run::options::EvaluationAtEnd;
-use crate::run::report::views::TestViews;
+use crate::run::report::test_views::TestViews;
 use crate::run::report::{Facts, Report};
 use anyhow::Result;
 use std::path::PathBuf;
 use std::time::{Instant, SystemTime};
 
-/// Measuring the test views at the end takes at most this part of the training's seconds, unless all are asked for.
+/// Measuring the test views at the end takes at most this part of the training time, unless all are asked for.
 const EVALUATION_SHARE: f64 = 0.1;
 
 /// Why test views were not measured at the end.
@@ -43,19 +43,20 @@ impl TrainingSession<'_> {
         };
         let clock = Instant::now();
         // What is to be the same again must not depend on the clock.
-        let is_limited = self.evaluation.at_end == EvaluationAtEnd::Share && !self.about.config.deterministic;
+        let is_limited =
+            self.evaluation.at_end == EvaluationAtEnd::Share && !self.metadata.config.deterministic;
         let limit = is_limited.then_some(EVALUATION_SHARE * end.seconds);
         let views = TestViews::measure(evaluator, &self.test, limit, observer)?;
-        if let Some(outcome) = views.outcome() {
+        if let Some(summary) = views.summary() {
             self.log.write(&LogRow::Evaluation(log::Evaluation {
                 step: end.step.into(),
                 seconds: Some(end.seconds),
-                eval_psnr: Some(outcome.psnr),
-                eval_ssim: Some(outcome.ssim),
+                eval_psnr: Some(summary.psnr),
+                eval_ssim: Some(summary.ssim),
                 eval_seconds: Some(clock.elapsed().as_secs_f64()),
-                views: outcome.views,
-                views_left_out: Some(outcome.left_out),
-                near_share: outcome.near_share,
+                views: summary.views,
+                views_left_out: Some(summary.left_out),
+                near_share: summary.near_share,
             }))?;
         }
         Ok(Ok(views))
@@ -66,8 +67,8 @@ impl TrainingSession<'_> {
     /// # Errors
     /// When the log cannot be read, a chart cannot be drawn, or the page cannot be written.
     pub fn write_report(&self, end: &TrainingEnd, views: Result<TestViews, String>) -> Result<PathBuf> {
-        let about = About { step: end.step, seconds: end.seconds, ..self.about.clone() };
-        let facts = Facts { trained: Some(SystemTime::now()), ..Facts::of(self.folder.path(), &about)? };
+        let metadata = Metadata { step: end.step, seconds: end.seconds, ..self.metadata.clone() };
+        let facts = Facts { trained: Some(SystemTime::now()), ..Facts::of(self.folder.path(), &metadata)? };
         let out = self.folder.report();
         Report { facts, log: self.folder.log()?, views }.save(&out)?;
         Ok(out)

@@ -1,7 +1,7 @@
 //! What turns raw network outputs into log-density and colour, and its slope.
 
 use super::probe::Probe;
-use super::{Subject, Tally};
+use super::{CheckResult, CheckedAdapter};
 use crate::verify::reference::ColorRange;
 use crate::verify::reference::activation::{
     MAX_LOG_COLOR, MAX_LOG_DENSITY, color, color_backward, log_density, log_density_backward,
@@ -12,14 +12,19 @@ use anyhow::Result;
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
-pub fn activations(subject: &Subject) -> Result<Tally> {
-    let mut tally = Tally::new("activations", 5e-7, "eight roundings: e^x, sum, quotient, product");
-    compare(subject, &mut tally, ColorRange::Ldr, "sigmoid")?;
-    compare(subject, &mut tally, ColorRange::Hdr, "exponential")?;
-    Ok(tally)
+pub fn activations(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result = CheckResult::new("activations", 5e-7, "eight roundings: e^x, sum, quotient, product");
+    compare(adapter, &mut result, ColorRange::Ldr, "sigmoid")?;
+    compare(adapter, &mut result, ColorRange::Hdr, "exponential")?;
+    Ok(result)
 }
 
-fn compare(subject: &Subject, tally: &mut Tally, range: ColorRange, activation: &str) -> Result<()> {
+fn compare(
+    adapter: &CheckedAdapter,
+    result: &mut CheckResult,
+    range: ColorRange,
+    activation: &str,
+) -> Result<()> {
     let body = "let raw = input(0u).x;\n\
                 let gradient = input(0u).y;\n\
                 let color = color_activation(vec3(raw)).x;\n\
@@ -27,18 +32,18 @@ fn compare(subject: &Subject, tally: &mut Tally, range: ColorRange, activation: 
                 output(0u, vec4(color, d_color, density_log(raw), density_log_backward(raw, gradient)));";
     let inputs = inputs();
     let outputs = Probe { needs: "activation, density", variants: &[("activation", activation)], body }
-        .evaluate::<1, 1>(subject, &inputs)?;
+        .evaluate::<1, 1>(adapter, &inputs)?;
     for ([[raw, gradient, ..]], [got]) in inputs.into_iter().zip(outputs) {
         let (raw, gradient, got) = (f64::from(raw), f64::from(gradient), got.map(f64::from));
         let case = |what: &str| format!("{range:?}: {what} at {raw:e}");
         let want = color(range, raw);
-        tally.value(got[0], want, want.max(1e-30), || case("colour"));
+        result.value(got[0], want, want.max(1e-30), || case("colour"));
         let slope = color_backward(range, raw, gradient);
-        tally.value(got[1], slope, gradient.abs() * want.max(1e-30), || case("slope of colour"));
+        result.value(got[1], slope, gradient.abs() * want.max(1e-30), || case("slope of colour"));
         let log = log_density(raw);
-        tally.value(got[2], log, log.abs(), || case("log-density"));
+        result.value(got[2], log, log.abs(), || case("log-density"));
         let slope = log_density_backward(raw, gradient);
-        tally.value(got[3], slope, gradient.abs(), || case("slope of log-density"));
+        result.value(got[3], slope, gradient.abs(), || case("slope of log-density"));
     }
     Ok(())
 }

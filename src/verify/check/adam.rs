@@ -1,8 +1,8 @@
 //! The optimiser, of the table and of the networks, over several steps.
 
-use super::draw::{Random, quiet_step};
-use super::tally::largest;
-use super::{Setup, Subject, Tally, Workbench};
+use super::check_result::largest;
+use super::inputs::{Random, quiet_step};
+use super::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::field::{Counters, Step, optimize};
 use crate::verify::reference::adam::{Adam, Moments, Schedule};
 use anyhow::Result;
@@ -13,12 +13,12 @@ const STEPS: u32 = 6;
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn adam(subject: &Subject) -> Result<Vec<Tally>> {
+pub fn adam(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
     let mut setup = Setup::tiny().network(32, 2);
     setup.config.optimizer.beta_1 = 0.9;
     setup.config.optimizer.beta_2 = 0.99;
     setup.config.optimizer.l2 = 1e-3;
-    let bench = subject.workbench(setup)?;
+    let bench = adapter.workbench(setup)?;
     Ok(vec![table(&bench)?, networks(&bench)?])
 }
 
@@ -51,8 +51,8 @@ fn gradients(random: &mut Random, step: u32, count: usize) -> Vec<f32> {
         .collect()
 }
 
-fn table(bench: &Workbench) -> Result<Tally> {
-    let mut tally = Tally::new("Adam: table", 3e-6, "four roundings per step and moment, six steps");
+fn table(bench: &Workbench) -> Result<CheckResult> {
+    let mut result = CheckResult::new("Adam: table", 3e-6, "four roundings per step and moment, six steps");
     let stages = optimize::stages(&bench.gpu, &bench.plan, &bench.workspace)?;
     let mut random = Random::new(70);
     let count = bench.plan.layout.entries * 2;
@@ -71,19 +71,19 @@ fn table(bench: &Workbench) -> Result<Tally> {
         sizes.iter_mut().zip(&gradient).for_each(|(size, g)| *size = size.max(f64::from(g.abs())));
     }
     let [first, second] = bench.table_moments()?;
-    tally.each("first moments", &first, &moments.first, |i| sizes[i]);
-    tally.each("second moments", &second, &moments.second, |i| moments.second[i].max(1e-24));
+    result.each("first moments", &first, &moments.first, |i| sizes[i]);
+    result.each("second moments", &second, &moments.second, |i| moments.second[i].max(1e-24));
     let table = bench.table()?;
-    tally.each("parameters", &table, &want, |_| 1.0);
+    result.each("parameters", &table, &want, |_| 1.0);
     // Every third gradient of the first half was always zero.
     let untouched = (0..count / 2).step_by(3).all(|i| table[i] == start[i] && second[i] == 0.0);
-    tally.holds(untouched, || "parameters without a gradient".into());
-    Ok(tally)
+    result.holds(untouched, || "parameters without a gradient".into());
+    Ok(result)
 }
 
-fn networks(bench: &Workbench) -> Result<Tally> {
-    let mut tally =
-        Tally::new("Adam: networks", 5e-6, "sums of 32 chunks and four roundings per step, six steps");
+fn networks(bench: &Workbench) -> Result<CheckResult> {
+    let mut result =
+        CheckResult::new("Adam: networks", 5e-6, "sums of 32 chunks and four roundings per step, six steps");
     let stages = optimize::stages(&bench.gpu, &bench.plan, &bench.workspace)?;
     let mut random = Random::new(71);
     bench.randomise(&mut random, 1.0, 1.0)?;
@@ -105,9 +105,9 @@ fn networks(bench: &Workbench) -> Result<Tally> {
         adam.update(Schedule { step, learning_rate }, &mut moments, &mut want, &gradient);
     }
     let read = |name: &str| -> Result<Vec<f32>> { bench.read(name, quads * 4) };
-    tally.all("first moments", &read("mlp_first")?, &moments.first);
-    tally.all("second moments", &read("mlp_second")?, &moments.second);
+    result.all("first moments", &read("mlp_first")?, &moments.first);
+    result.all("second moments", &read("mlp_second")?, &moments.second);
     let scale = largest(&want);
-    tally.each("parameters", &read("mlp")?, &want, |_| scale);
-    Ok(tally)
+    result.each("parameters", &read("mlp")?, &want, |_| scale);
+    Ok(result)
 }

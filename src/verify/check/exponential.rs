@@ -1,7 +1,7 @@
 //! The exponentials whose error must not depend on the driver.
 
 use super::probe::Probe;
-use super::{Subject, Tally};
+use super::{CheckResult, CheckedAdapter};
 use crate::verify::reference::composite::{opacity, optical_depth};
 use anyhow::Result;
 
@@ -9,27 +9,30 @@ use anyhow::Result;
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
-pub fn exponentials(subject: &Subject) -> Result<Tally> {
-    let mut tally =
-        Tally::new("exponentials", 2.5e-7, "four roundings: range reduction, series, product, 1 - e^-x");
+pub fn exponentials(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result = CheckResult::new(
+        "exponentials",
+        2.5e-7,
+        "four roundings: range reduction, series, product, 1 - e^-x",
+    );
     let inputs = inputs();
     let body = "let x = input(0u);\n\
                 output(0u, vec4(exp_accurate(x.x), opacity(x.y), optical_depth(x.z, x.w), 0.0));";
-    let outputs = Probe { needs: "exp", variants: &[], body }.evaluate::<1, 1>(subject, &inputs)?;
+    let outputs = Probe { needs: "exp", variants: &[], body }.evaluate::<1, 1>(adapter, &inputs)?;
     for ([input], [got]) in inputs.iter().zip(&outputs) {
         let [x, tau, s, delta] = input.map(f64::from);
         let [exp, alpha, depth] = [got[0], got[1], got[2]].map(f64::from);
         match x {
-            ..-87.0 => tally.holds(exp == 0.0, || format!("e^{x:e} is {exp:e}")),
-            _ => tally.value(exp, x.min(88.0).exp(), x.min(88.0).exp(), || format!("e^{x:e}")),
+            ..-87.0 => result.holds(exp == 0.0, || format!("e^{x:e} is {exp:e}")),
+            _ => result.value(exp, x.min(88.0).exp(), x.min(88.0).exp(), || format!("e^{x:e}")),
         }
         let want = opacity(tau);
-        tally.value(alpha, want, want.max(SMALLEST), || format!("opacity at {tau:e}"));
+        result.value(alpha, want, want.max(SMALLEST), || format!("opacity at {tau:e}"));
         // Nothing passes behind 200, and what is below the range of single precision may be 0.
         let want = optical_depth(s, delta).min(200.0);
-        tally.value(depth, want, want.max(SMALLEST), || format!("optical depth of {s:e} and {delta:e}"));
+        result.value(depth, want, want.max(SMALLEST), || format!("optical depth of {s:e} and {delta:e}"));
     }
-    Ok(tally)
+    Ok(result)
 }
 
 /// Smallest normal number of single precision over the rounding that is allowed: where it may be flushed to 0.

@@ -1,12 +1,12 @@
 //! The fused kernel: rays of any number and length through it, and how far it is from what is expected.
 
-use super::draw::Random;
-use super::hard_rays::HardRay;
-use super::{Setup, Subject, Tally, Workbench};
+use super::inputs::Random;
+use super::stress_rays::StressRay;
+use super::{CheckResult, CheckedAdapter, Setup, Workbench};
+use crate::config::Transmittance;
 use crate::field::link::group_size;
 use crate::field::{Counters, composite};
 use crate::gpu::pass::Stage;
-use crate::verify::reference::Transmittance;
 use crate::verify::reference::composite::{CompositeInput, CompositeOutput};
 use crate::verify::reference::vectors::{Expected, GoldenFile, RayError};
 use anyhow::{Context, Result};
@@ -35,14 +35,14 @@ impl Fused {
     ///
     /// # Errors
     /// When the adapter cannot hold them.
-    pub fn new(subject: &Subject, convention: Transmittance, longest: usize) -> Result<Self> {
+    pub fn new(adapter: &CheckedAdapter, convention: Transmittance, longest: usize) -> Result<Self> {
         let samples = SAMPLES.max(longest);
         let mut setup = Setup::tiny().transmittance(convention);
         setup.config.batch.kept = samples;
         setup.config.batch.samples = samples;
         setup.config.batch.rays = RAYS;
         let context = || format!("the longest ray has {longest} samples");
-        let bench = subject.workbench(setup).with_context(context)?;
+        let bench = adapter.workbench(setup).with_context(context)?;
         let stage = composite::stage(&bench.gpu, &bench.plan, &bench.workspace, true)?;
         Ok(Self { bench, stage, samples })
     }
@@ -136,40 +136,41 @@ fn batch_of(ray: &CompositeInput<'_>) -> u32 {
 ///
 /// # Errors
 /// When the adapter cannot hold the longest ray, or the device was lost.
-pub fn golden_rays(subject: &Subject, file: &GoldenFile) -> Result<Vec<RayError>> {
+pub fn golden_rays(adapter: &CheckedAdapter, file: &GoldenFile) -> Result<Vec<RayError>> {
     let longest = file.rays.iter().map(|ray| ray.s.len()).max().unwrap_or(0);
-    let fused = Fused::new(subject, file.transmittance, longest)?;
+    let fused = Fused::new(adapter, file.transmittance, longest)?;
     let inputs: Vec<_> = file.rays.iter().map(|ray| file.input(ray)).collect();
     let outputs = fused.run(&inputs)?;
     Ok(file.rays.iter().zip(&outputs).map(|(ray, output)| RayError::new(&ray.expect, output)).collect())
 }
 
-/// Compositing, loss and gradients of hard rays, in both conventions.
+/// Compositing, loss and gradients of stress rays, in both conventions.
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
-pub fn fused(subject: &Subject) -> Result<Vec<Tally>> {
+pub fn fused(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
     Ok(vec![
-        of_convention(subject, Transmittance::Exclusive)?,
-        of_convention(subject, Transmittance::Inclusive)?,
+        of_convention(adapter, Transmittance::Exclusive)?,
+        of_convention(adapter, Transmittance::Inclusive)?,
     ])
 }
 
-fn of_convention(subject: &Subject, convention: Transmittance) -> Result<Tally> {
+fn of_convention(adapter: &CheckedAdapter, convention: Transmittance) -> Result<CheckResult> {
     let name = match convention {
         Transmittance::Exclusive => "render, loss, gradient: exclusive",
         Transmittance::Inclusive => "render, loss, gradient: inclusive",
     };
-    let mut tally = Tally::new(name, BOUND, "T = e^-depth: depths up to 90 round to 4e-6, as do their terms");
-    let rays = HardRay::many(&mut Random::new(1), 11 * HardRay::KINDS, LONGEST);
+    let mut result =
+        CheckResult::new(name, BOUND, "T = e^-depth: depths up to 90 round to 4e-6, as do their terms");
+    let rays = StressRay::many(&mut Random::new(1), 11 * StressRay::KINDS, LONGEST);
     let m = rays.len() as u32;
     let inputs: Vec<_> = rays.iter().map(|ray| ray.input(m)).collect();
-    let outputs = Fused::new(subject, convention, LONGEST)?.run(&inputs)?;
+    let outputs = Fused::new(adapter, convention, LONGEST)?.run(&inputs)?;
     for ((ray, input), output) in rays.iter().zip(&inputs).zip(&outputs) {
         let error = RayError::new(&Expected::of(convention, input), output);
-        tally.error(error.error, || format!("{} of '{}'", error.quantity, ray.name));
+        result.error(error.error, || format!("{} of '{}'", error.quantity, ray.name));
         // Every value of the ray was compared.
-        tally.cases += 4 + 5 * ray.s.len();
+        result.cases += 4 + 5 * ray.s.len();
     }
-    Ok(tally)
+    Ok(result)
 }

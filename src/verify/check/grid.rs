@@ -1,7 +1,7 @@
 //! The hash grid's features.
 
-use super::draw::Random;
-use super::{Setup, Subject, Tally, Workbench};
+use super::inputs::Random;
+use super::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::field::density;
 use crate::field::layout::FEATURES;
 use crate::gpu::pass::Stage;
@@ -14,20 +14,20 @@ use glam::DVec3;
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn features(subject: &Subject) -> Result<Tally> {
-    let mut tally =
-        Tally::new("hash grid: features", 3.6e-7, "a position in cells rounds to half a unit per axis");
+pub fn features(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result =
+        CheckResult::new("hash grid: features", 3.6e-7, "a position in cells rounds to half a unit per axis");
     for finest in [40, 2048] {
         let mut setup = Setup::tiny();
         setup.config.grid.finest = finest;
-        let bench = subject.workbench(setup)?;
+        let bench = adapter.workbench(setup)?;
         let mut random = Random::new(10);
         let table = random.numbers(bench.plan.layout.entries * FEATURES, -1.0, 1.0);
         bench.set_table(&table);
         let table: Vec<f64> = table.iter().map(|&x| f64::from(x)).collect();
         let stages = density::stages(&bench.gpu, &bench.plan, &bench.workspace)?;
         let levels = bench.levels();
-        tally
+        result
             .holds(levels.iter().any(|level| level.dense) && levels.iter().any(|level| !level.dense), || {
                 "levels of both kinds".into()
             });
@@ -39,11 +39,11 @@ pub fn features(subject: &Subject) -> Result<Tally> {
                 let want = grid_encode(&levels, &table, *position);
                 // Entries are up to 1; a weight is a difference of positions in cells.
                 let size = |i: usize| 1.0 + f64::from(levels[i / FEATURES].resolution);
-                tally.each(&format!("{case}, at {position}"), got, &want, size);
+                result.each(&format!("{case}, at {position}"), got, &want, size);
             }
         }
     }
-    Ok(tally)
+    Ok(result)
 }
 
 /// The device's features of `positions`, `[positions, levels · 2]`; `stages` are those of [`density::stages`].

@@ -1,7 +1,7 @@
 //! The colour network's input: features as they are, and harmonics of the direction.
 
-use super::draw::Random;
-use super::{Setup, Subject, Tally};
+use super::inputs::Random;
+use super::{CheckResult, CheckedAdapter, Setup};
 use crate::field::layout::{COLOR_INPUTS, DENSITY_OUTPUTS};
 use crate::field::{Counters, color, dispatch};
 use crate::verify::reference::harmonics::harmonics as reference;
@@ -12,9 +12,9 @@ use glam::DVec3;
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
-pub fn harmonics(subject: &Subject) -> Result<Tally> {
-    let mut tally = Tally::new("harmonics", 1.8e-7, "three roundings of terms of up to 1");
-    let bench = subject.workbench(Setup::tiny())?;
+pub fn harmonics(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result = CheckResult::new("harmonics", 1.8e-7, "three roundings of terms of up to 1");
+    let bench = adapter.workbench(Setup::tiny())?;
     let mut random = Random::new(42);
     let directions = directions(&mut random, bench.plan.config.batch.rays);
     let count = directions.len();
@@ -26,19 +26,19 @@ pub fn harmonics(subject: &Subject) -> Result<Tally> {
     bench.write("kept_rows", &rows);
     bench.set_counters(Counters { kept: count as u32, ..Counters::default() });
     bench.workspace.set_dispatch(&bench.gpu, dispatch::KEPT, count);
-    let stages = color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::Selection::Training)?;
+    let stages = color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::SelectionMode::Training)?;
     bench.run_only(&stages, "color input")?;
     let inputs: Vec<f32> = bench.read("color_input", count * COLOR_INPUTS)?;
     for (ray, (input, direction)) in inputs.chunks_exact(COLOR_INPUTS).zip(&directions).enumerate() {
         let (copied, terms) = input.split_at(DENSITY_OUTPUTS);
         let sample = rows[ray][0] as usize * DENSITY_OUTPUTS;
-        tally.holds(copied == &features[sample..sample + DENSITY_OUTPUTS], || {
+        result.holds(copied == &features[sample..sample + DENSITY_OUTPUTS], || {
             format!("features of ray {ray}")
         });
         // No term is much larger than 1, nor what is summed in it.
-        tally.each(&format!("direction {direction}"), terms, &reference(*direction), |_| 1.0);
+        result.each(&format!("direction {direction}"), terms, &reference(*direction), |_| 1.0);
     }
-    Ok(tally)
+    Ok(result)
 }
 
 /// Unit vectors: along axes and diagonals, nearly so, and anywhere.

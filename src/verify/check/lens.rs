@@ -1,8 +1,8 @@
 //! Lenses on their own: what Newton's method follows back, and the sine and cosine of angles.
 
-use super::draw::Random;
+use super::inputs::Random;
 use super::probe::Probe;
-use super::{Subject, Tally};
+use super::{CheckResult, CheckedAdapter};
 use crate::camera::Lens;
 use crate::verify::reference::lens::{self, Distortion, Fisheye};
 use anyhow::Result;
@@ -12,20 +12,20 @@ use glam::{DVec2, DVec3};
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn lens_models(subject: &Subject) -> Result<Vec<Tally>> {
-    Ok(vec![points_and_slopes(subject)?, undistorted_points(subject)?, sines(subject)?])
+pub fn lens_models(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
+    Ok(vec![points_and_slopes(adapter)?, undistorted_points(adapter)?, sines(adapter)?])
 }
 
 /// What OpenCV's models add to a point, and their slopes, for coefficients far stronger than any that are built.
-fn points_and_slopes(subject: &Subject) -> Result<Tally> {
-    let mut tally =
-        Tally::new("lens: points and slopes", 1e-6, "sixteen roundings of polynomials of degree 9");
+fn points_and_slopes(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result =
+        CheckResult::new("lens: points and slopes", 1e-6, "sixteen roundings of polynomials of degree 9");
     let body = "let at = opencv_bend(input(0u).xy, input(1u), input(0u).zw);\n\
                 output(0u, vec4(at.shift, at.d_x));\n\
                 output(1u, vec4(at.d_y, fisheye_bend(abs(input(0u).x), input(1u))));";
     let mut random = Random::new(44);
     let inputs: Vec<_> = (0..4000).map(|_| input(&mut random)).collect();
-    let outputs = Probe { needs: "camera", variants: &[], body }.evaluate::<2, 2>(subject, &inputs)?;
+    let outputs = Probe { needs: "camera", variants: &[], body }.evaluate::<2, 2>(adapter, &inputs)?;
     for (input, [first, second]) in inputs.iter().zip(outputs) {
         let [[x, y, p1, p2], k] = input.map(|row| row.map(f64::from));
         let (lens, point) = (Distortion { k, p: [p1, p2] }, DVec2::new(x, y));
@@ -33,19 +33,19 @@ fn points_and_slopes(subject: &Subject) -> Result<Tally> {
         let (size, corner) = (Distortion { k: k.map(f64::abs), p: [p1.abs(), p2.abs()] }, point.abs());
         let case = || format!("{lens:?} at {point}");
         let (got, want) = (vector([first[0], first[1]]), lens.distort(point) - point);
-        compare(&mut tally, got, want, size.distort(corner), case);
+        compare(&mut result, got, want, size.distort(corner), case);
         let rows = [[first[2], first[3]], [second[0], second[1]]];
         let (want, size) = (lens.jacobian(point).transpose(), size.jacobian(corner).transpose());
         for (row, got) in rows.into_iter().enumerate() {
-            compare(&mut tally, vector(got), want.col(row), size.col(row), case);
+            compare(&mut result, vector(got), want.col(row), size.col(row), case);
         }
         let (lens, theta) = (Fisheye { k }, x.abs());
         let size = Fisheye { k: k.map(f64::abs) };
         let want = DVec2::new(lens.radius(theta) - theta, lens.slope(theta));
         let size = DVec2::new(size.radius(theta), size.slope(theta));
-        compare(&mut tally, vector([second[2], second[3]]), want, size, || format!("{lens:?} at {theta}"));
+        compare(&mut result, vector([second[2], second[3]]), want, size, || format!("{lens:?} at {theta}"));
     }
-    Ok(tally)
+    Ok(result)
 }
 
 /// Ordinary lenses, strong ones, and ones that fold within the image.
@@ -66,8 +66,8 @@ const IMAGE: [f64; 2] = [1000.0, 750.0];
 const FOCAL_PX: [f64; 2] = [810.0, 310.0];
 
 /// Points all over an image through the inverse of the lens and back through the reference's lens, in pixels.
-fn undistorted_points(subject: &Subject) -> Result<Tally> {
-    let mut tally = Tally::new(
+fn undistorted_points(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result = CheckResult::new(
         "lens: round trips, pixels",
         1e-4,
         "points and angles round; the image is 1000 pixels wide",
@@ -83,7 +83,7 @@ fn undistorted_points(subject: &Subject) -> Result<Tally> {
                 output(0u, vec4(seen.direction, select(0.0, 1.0, seen.exists)));";
     for lens in LENSES {
         let (focal_px, inputs) = image_of(lens);
-        let outputs = Probe { needs: "camera", variants: &[], body }.evaluate::<3, 1>(subject, &inputs)?;
+        let outputs = Probe { needs: "camera", variants: &[], body }.evaluate::<3, 1>(adapter, &inputs)?;
         let mut seen = 0;
         for (input, [[x, y, z, exists]]) in inputs.iter().zip(outputs) {
             let plane = vector([input[0][0], input[0][1]]);
@@ -93,16 +93,16 @@ fn undistorted_points(subject: &Subject) -> Result<Tally> {
             if inside != outside {
                 continue;
             }
-            tally.holds((exists > 0.0) == inside, || format!("{}: is there a ray?", case()));
+            result.holds((exists > 0.0) == inside, || format!("{}: is there a ray?", case()));
             if inside && exists > 0.0 {
                 seen += 1;
                 let back = lens::image(&lens, DVec3::from_array([x, y, z].map(f64::from)));
-                tally.error(focal_px * (back - plane).length(), || format!("{}: back at {back}", case()));
+                result.error(focal_px * (back - plane).length(), || format!("{}: back at {back}", case()));
             }
         }
-        tally.holds(seen > 1000, || format!("{lens:?}: only {seen} rays"));
+        result.holds(seen > 1000, || format!("{lens:?}: only {seen} rays"));
     }
-    Ok(tally)
+    Ok(result)
 }
 
 /// Every 11th pixel of an image, as points on the lens's plane, with its coefficients and its rim.
@@ -134,9 +134,9 @@ fn input(random: &mut Random) -> [[f32; 4]; 2] {
 }
 
 /// Compares both components.
-fn compare(tally: &mut Tally, got: DVec2, want: DVec2, size: DVec2, case: impl Fn() -> String) {
-    tally.value(got.x, want.x, size.x, &case);
-    tally.value(got.y, want.y, size.y, &case);
+fn compare(result: &mut CheckResult, got: DVec2, want: DVec2, size: DVec2, case: impl Fn() -> String) {
+    result.value(got.x, want.x, size.x, &case);
+    result.value(got.y, want.y, size.y, &case);
 }
 
 fn vector([x, y]: [f32; 2]) -> DVec2 {
@@ -144,16 +144,16 @@ fn vector([x, y]: [f32; 2]) -> DVec2 {
 }
 
 /// Sine and cosine over more than a turn.
-fn sines(subject: &Subject) -> Result<Tally> {
-    let mut tally =
-        Tally::new("sine and cosine", 1e-7, "the last sum of a series rounds, and its argument did");
+fn sines(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result =
+        CheckResult::new("sine and cosine", 1e-7, "the last sum of a series rounds, and its argument did");
     let body = "output(0u, vec4(sine_cosine(input(0u).x), sine_cosine(input(0u).y)));";
     let angle = |i: i32| (4.0 * f64::from(i) / 10_000.0) as f32;
     let inputs: Vec<_> = (0..=10_000).map(|i| [[angle(i), -angle(i), 0.0, 0.0]]).collect();
-    let outputs = Probe { needs: "sine", variants: &[], body }.evaluate::<1, 1>(subject, &inputs)?;
+    let outputs = Probe { needs: "sine", variants: &[], body }.evaluate::<1, 1>(adapter, &inputs)?;
     for ([input], [got]) in inputs.iter().zip(&outputs) {
         let (sine, cosine) = f64::from(input[0]).sin_cos();
-        tally.each(&format!("{}", input[0]), got, &[sine, cosine, -sine, cosine], |_| 1.0);
+        result.each(&format!("{}", input[0]), got, &[sine, cosine, -sine, cosine], |_| 1.0);
     }
-    Ok(tally)
+    Ok(result)
 }

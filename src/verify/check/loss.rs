@@ -1,11 +1,11 @@
 //! The fused kernel with everything that a loss may have: errors relative to the colour, depth, distortion and sparsity.
 
-use super::draw::Random;
+use super::inputs::Random;
 use super::workbench::KeptStep;
-use super::{Setup, Subject, Tally};
+use super::{CheckResult, CheckedAdapter, Setup};
+use crate::config::Transmittance;
 use crate::config::{ColorLoss, Loss};
 use crate::field::{Counters, composite};
-use crate::verify::reference::Transmittance;
 use crate::verify::reference::composite::{CompositeInput, CompositeOutput, optical_depths};
 use crate::verify::reference::loss::{Places, SPARSE_DENSITY, composite_with, distortion};
 use crate::verify::reference::model::Objective;
@@ -15,7 +15,7 @@ use anyhow::Result;
 const LEAST: f64 = 1e-30;
 
 /// A ray whose distances are known.
-struct Ray {
+struct KnownRay {
     s: Vec<f64>,
     delta: Vec<f64>,
     color: Vec<[f64; 3]>,
@@ -40,7 +40,7 @@ struct Case {
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
-pub fn further_terms(subject: &Subject) -> Result<Vec<Tally>> {
+pub fn further_terms(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
     let cases = [
         Case {
             name: "depth and relative errors",
@@ -61,20 +61,21 @@ pub fn further_terms(subject: &Subject) -> Result<Vec<Tally>> {
             bound: (2e-5, "T = e^-depth rounds"),
         },
     ];
-    cases.iter().map(|case| case.run(subject)).collect()
+    cases.iter().map(|case| case.run(adapter)).collect()
 }
 
 impl Case {
-    fn run(&self, subject: &Subject) -> Result<Tally> {
-        let mut tally = Tally::new(self.name, self.bound.0, self.bound.1);
+    fn run(&self, adapter: &CheckedAdapter) -> Result<CheckResult> {
+        let mut result = CheckResult::new(self.name, self.bound.0, self.bound.1);
         for convention in [Transmittance::Exclusive, Transmittance::Inclusive] {
             let mut setup = Setup::tiny().transmittance(convention);
             setup.config.loss = self.loss.clone();
-            setup.needs.depth = true;
+            setup.features.depth = true;
             (setup.config.batch.kept, setup.config.batch.samples) = (8192, 8192);
-            let bench = subject.workbench(setup)?;
+            let bench = adapter.workbench(setup)?;
             let mut random = Random::new(73);
-            let rays: Vec<_> = (0..200).map(|number| Ray::new(&mut random, number, self.distances)).collect();
+            let rays: Vec<_> =
+                (0..200).map(|number| KnownRay::new(&mut random, number, self.distances)).collect();
             let mut first = 0;
             let spans: Vec<[u32; 2]> = (rays.iter())
                 .map(|ray| {
@@ -90,7 +91,7 @@ impl Case {
             for (number, (ray, [first, count])) in rays.iter().zip(spans).enumerate() {
                 let range = first as usize..(first + count) as usize;
                 ray.compare(
-                    &mut tally,
+                    &mut result,
                     &bench.objective(),
                     &gradients[range],
                     results[number].errors,
@@ -98,12 +99,12 @@ impl Case {
                 );
             }
         }
-        Ok(tally)
+        Ok(result)
     }
 }
 
-fn upload(bench: &super::Workbench, rays: &[Ray], spans: &[[u32; 2]]) {
-    let all = |value: fn(&Ray) -> Vec<[f32; 4]>| rays.iter().flat_map(value).collect::<Vec<_>>();
+fn upload(bench: &super::Workbench, rays: &[KnownRay], spans: &[[u32; 2]]) {
+    let all = |value: fn(&KnownRay) -> Vec<[f32; 4]>| rays.iter().flat_map(value).collect::<Vec<_>>();
     let step = |((&s, &delta), &distance): ((&f64, &f64), &f64)| {
         [[s as f32, delta as f32, 0.0, distance as f32], [1.0, 1.0, 0.0, 0.0]]
     };
@@ -121,7 +122,7 @@ fn narrow(values: [f64; 4]) -> [f32; 4] {
     values.map(|value| value as f32)
 }
 
-impl Ray {
+impl KnownRay {
     /// Every fifth ray has all its samples at one distance.
     fn new(random: &mut Random, number: usize, [nearest, farthest]: [f64; 2]) -> Self {
         let count = number * 7 % 61;
@@ -152,7 +153,7 @@ impl Ray {
 
     fn compare(
         &self,
-        tally: &mut Tally,
+        result: &mut CheckResult,
         objective: &Objective,
         gradients: &[[f32; 4]],
         errors: [f32; 4],
@@ -173,14 +174,14 @@ impl Ray {
         for (x, &error) in errors.iter().enumerate().take(3) {
             let weight = objective.loss.weights(want.rendered, self.target)[x];
             let size = (want.rendered[x].abs() + self.target[x].abs()).powi(2) * weight;
-            tally.value(error.into(), want.loss_terms[x], size, || case("squared error"));
+            result.value(error.into(), want.loss_terms[x], size, || case("squared error"));
         }
         let loss = errors.iter().map(|&error| f64::from(error)).sum::<f64>() / (4.0 * 200.0);
-        tally.value(loss, want.loss, scales.loss, || case("loss"));
+        result.value(loss, want.loss, scales.loss, || case("loss"));
         for (i, got) in gradients.iter().enumerate() {
             let scale = |x: usize| (scales.residual[x] * want.weights[i]).max(LEAST);
-            tally.each(&case("by colour"), &got[..3], &want.d_color[i], scale);
-            tally.value(got[3].into(), want.d_s[i], scales.d_s[i].max(LEAST), || case("by log-density"));
+            result.each(&case("by colour"), &got[..3], &want.d_color[i], scale);
+            result.value(got[3].into(), want.d_s[i], scales.d_s[i].max(LEAST), || case("by log-density"));
         }
     }
 }

@@ -1,8 +1,8 @@
 //! From rays to samples, through the occupancy grid.
 
-use super::draw::{Random, uniform};
+use super::inputs::{Random, uniform};
 use super::rays::{drawn, pixel_camera};
-use super::{Setup, Subject, Tally, Workbench};
+use super::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::field::{Counters, dimension, march, rays};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::march::{BoxRay, March, MarchSample, box_interval};
@@ -28,8 +28,8 @@ pub struct Marching {
 
 /// What agrees and what does not.
 struct Found {
-    positions: Tally,
-    steps: Tally,
+    positions: CheckResult,
+    steps: CheckResult,
     agreeing: usize,
     differing: usize,
 }
@@ -39,14 +39,14 @@ struct Found {
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn marched_samples(subject: &Subject) -> Result<Vec<Tally>> {
+pub fn marched_samples(adapter: &CheckedAdapter) -> Result<Vec<CheckResult>> {
     let mut found = Found {
-        positions: Tally::new(
+        positions: CheckResult::new(
             "marching: samples",
             4e-6,
             "distances of up to 4 box sides round, and logarithms of them",
         ),
-        steps: Tally::new(
+        steps: CheckResult::new(
             "marching: steps",
             1e-5,
             "differences of two distances, where a step spans two parts of the cone",
@@ -57,7 +57,7 @@ pub fn marched_samples(subject: &Subject) -> Result<Vec<Tally>> {
     for (cascades, step_excess) in [(1, 0.0), (3, 0.0), (1, 0.75), (3, 0.75), (3, 7.0)] {
         let mut setup = Setup::tiny().cascades(cascades);
         setup.config.batch.samples = 16384;
-        let mut marching = Marching::new(subject, setup)?;
+        let mut marching = Marching::new(adapter, setup)?;
         marching.step_excess = step_excess;
         let mut random = Random::new(50 + cascades);
         let cells = marching.bench.plan.cell_count();
@@ -89,9 +89,9 @@ impl Marching {
     ///
     /// # Errors
     /// When the adapter cannot hold it or refuses a kernel.
-    pub fn new(subject: &Subject, setup: Setup) -> Result<Self> {
+    pub fn new(adapter: &CheckedAdapter, setup: Setup) -> Result<Self> {
         let rays = rays();
-        let mut bench = subject.workbench(setup)?;
+        let mut bench = adapter.workbench(setup)?;
         let cameras: Vec<_> = rays.iter().map(|ray| pixel_camera(ray.origin, ray.direction)).collect();
         bench.workspace.add(bench.gpu.storage_with("cameras", &cameras)?);
         bench.add_photos(&[])?;
@@ -139,7 +139,7 @@ impl Marching {
             }
             packed += number;
             let start = if jitter { uniform(index, dimension::OFFSET) } else { 0.5 };
-            let ray = Ray { march, ray: self.rays[drawn(index, &pixels).0], start, words };
+            let ray = MarchedRay { march, ray: self.rays[drawn(index, &pixels).0], start, words };
             ray.compare(found, &samples[first..packed], &format!("{case}, ray {index}"));
         }
         let all = packed == samples.len()
@@ -164,14 +164,14 @@ pub(super) fn reference(bench: &Workbench) -> March {
 }
 
 /// A ray with what the reference needs to march it.
-struct Ray<'a> {
+struct MarchedRay<'a> {
     march: March,
     ray: BoxRay,
     start: f64,
     words: &'a [u32],
 }
 
-impl Ray<'_> {
+impl MarchedRay<'_> {
     /// Compares its samples: positions, and the length of the step.
     fn compare(&self, found: &mut Found, got: &[[f32; 4]], case: &str) {
         let Self { march, ray, start, words } = *self;

@@ -1,10 +1,10 @@
 //! Both networks, forwards and backwards, and the scatter of their gradients into the hash table: everything that
 //! a batch leaves behind.
 
-use super::draw::{Random, random_batch};
+use super::check_result::largest;
 use super::grid::positions;
-use super::tally::largest;
-use super::{Outcome, Setup, Subject, Tally, Workbench};
+use super::inputs::{Random, random_batch};
+use super::{CheckResult, CheckedAdapter, PassOutput, Setup, Workbench};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::activation::color;
 use crate::verify::reference::grid::grid_encode;
@@ -15,7 +15,7 @@ use glam::DVec3;
 
 /// The sizes of a field and its colours.
 #[derive(Clone, Copy, Debug)]
-pub struct Shape {
+pub struct FieldShape {
     /// Levels of the grid.
     pub levels: usize,
     /// Width of hidden layers.
@@ -29,58 +29,62 @@ pub struct Shape {
 }
 
 /// Shapes that use every part: those that are trained with by default, and a small one.
-pub const SHAPES: [Shape; 4] = [
-    Shape { levels: 8, width: 16, color_layers: 1, hdr: false, saturated: false },
-    Shape { levels: 16, width: 64, color_layers: 2, hdr: false, saturated: false },
-    Shape { levels: 8, width: 32, color_layers: 2, hdr: false, saturated: true },
-    Shape { levels: 8, width: 32, color_layers: 2, hdr: true, saturated: true },
+pub const SHAPES: [FieldShape; 4] = [
+    FieldShape { levels: 8, width: 16, color_layers: 1, hdr: false, saturated: false },
+    FieldShape { levels: 16, width: 64, color_layers: 2, hdr: false, saturated: false },
+    FieldShape { levels: 8, width: 32, color_layers: 2, hdr: false, saturated: true },
+    FieldShape { levels: 8, width: 32, color_layers: 2, hdr: true, saturated: true },
 ];
 
 /// What a batch leaves, each with its own bound.
-struct Tallies {
-    density: Tally,
-    color: Tally,
-    rays: Tally,
-    weights: Tally,
-    table: Tally,
+struct NetworkResults {
+    density: CheckResult,
+    color: CheckResult,
+    rays: CheckResult,
+    weights: CheckResult,
+    table: CheckResult,
 }
 
 /// Batches of several sizes through fields of `shapes`, each value relative to the largest of its kind.
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn networks(subject: &Subject, shapes: &[Shape]) -> Result<Vec<Tally>> {
+pub fn networks(adapter: &CheckedAdapter, shapes: &[FieldShape]) -> Result<Vec<CheckResult>> {
     let values = "sums of up to 64 terms in 2 layers round; relative to the largest value";
     let gradients = "sums over up to 130 samples and 5 layers round; relative to the largest gradient";
-    let mut tallies = Tallies {
-        density: Tally::new("density network", 5e-6, values),
-        color: Tally::new(
+    let mut results = NetworkResults {
+        density: CheckResult::new("density network", 5e-6, values),
+        color: CheckResult::new(
             "colour network",
             5e-6,
             "sums of up to 64 terms in 5 layers round; relative to the largest",
         ),
-        rays: Tally::new("rendered batch and its loss", 1e-5, "as colours; squares double their errors"),
-        weights: Tally::new("gradients of both networks", 2e-5, gradients),
-        table: Tally::new("hash grid: scattered gradients", 2e-5, gradients),
+        rays: CheckResult::new(
+            "rendered batch and its loss",
+            1e-5,
+            "as colours; squares double their errors",
+        ),
+        weights: CheckResult::new("gradients of both networks", 2e-5, gradients),
+        table: CheckResult::new("hash grid: scattered gradients", 2e-5, gradients),
     };
     for shape in shapes {
-        let bench = workbench(subject, shape)?;
+        let bench = workbench(adapter, shape)?;
         let stages = bench.stages()?;
         for (case, batch) in batches(shape) {
-            tallies.compare(&format!("{shape:?}, {case}"), &bench, &stages, &batch)?;
+            results.compare(&format!("{shape:?}, {case}"), &bench, &stages, &batch)?;
         }
         // What was taken out is gone: a batch without samples leaves no gradient.
         let empty = bench.train(&stages, &random_batch(&mut Random::new(0), 3, 0))?;
-        tallies.table.holds(empty.d_table.iter().all(|&d| d == 0.0), || format!("{shape:?}, no samples"));
+        results.table.holds(empty.d_table.iter().all(|&d| d == 0.0), || format!("{shape:?}, no samples"));
     }
-    let Tallies { density, color, rays, weights, table } = tallies;
+    let NetworkResults { density, color, rays, weights, table } = results;
     Ok(vec![density, color, rays, weights, table])
 }
 
-fn workbench(subject: &Subject, shape: &Shape) -> Result<Workbench> {
+fn workbench(adapter: &CheckedAdapter, shape: &FieldShape) -> Result<Workbench> {
     let mut setup = Setup::tiny().network(shape.width, shape.color_layers).hdr(shape.hdr);
     setup.config.grid.levels = shape.levels;
-    let bench = subject.workbench(setup)?;
+    let bench = adapter.workbench(setup)?;
     bench.randomise(&mut Random::new(20), 1.0, 1.0)?;
     if shape.saturated {
         let mut weights = bench.weights("mlp")?;
@@ -94,7 +98,7 @@ fn workbench(subject: &Subject, shape: &Shape) -> Result<Workbench> {
 }
 
 /// Batches of odd sizes; one of special positions, and one of which all samples share a cell.
-fn batches(shape: &Shape) -> Vec<(String, Vec<TrainingRay>)> {
+fn batches(shape: &FieldShape) -> Vec<(String, Vec<TrainingRay>)> {
     let mut random = Random::new(21);
     let sizes = [(3, 0), (1, 1), (2, 3), (9, 65), (33, 130)];
     let mut batches: Vec<_> = (sizes.into_iter())
@@ -120,7 +124,7 @@ fn batches(shape: &Shape) -> Vec<(String, Vec<TrainingRay>)> {
     batches
 }
 
-impl Tallies {
+impl NetworkResults {
     /// Compares everything that a batch leaves with the reference.
     fn compare(
         &mut self,
@@ -147,9 +151,9 @@ impl Tallies {
         self.density.all(case, &got.density, &density);
         let want = model.forward_backward(bench.objective(), rays);
         // Exponentials turn the rounding error of a raw output, which grows with it, into a relative one.
-        let each = |tally: &mut Tally, case: &str, got: &[f32], want: &[f64]| {
+        let each = |result: &mut CheckResult, case: &str, got: &[f32], want: &[f64]| {
             let scale = most * largest(want);
-            tally.each(case, got, want, |_| scale);
+            result.each(case, got, want, |_| scale);
         };
         each(&mut self.color, case, &got.color, &colors);
         each(&mut self.rays, case, got.rendered.as_flattened(), want.rendered.as_flattened());
@@ -162,7 +166,7 @@ impl Tallies {
     fn compare_weights<'a>(
         &mut self,
         case: &str,
-        got: &Outcome,
+        got: &PassOutput,
         want: impl Iterator<Item = &'a Vec<f64>>,
         most: f64,
     ) {

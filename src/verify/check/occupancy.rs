@@ -1,7 +1,7 @@
 //! The occupancy grid's update.
 
-use super::draw::{Random, quiet_step, uniform};
-use super::{Setup, Subject, Tally, Workbench, visible_cells};
+use super::inputs::{Random, quiet_step, uniform};
+use super::{CheckResult, CheckedAdapter, Setup, Workbench, visible_cells};
 use crate::field::{Step, dimension, occupancy};
 use crate::verify::reference::grid::grid_encode;
 use crate::verify::reference::model::Model;
@@ -13,8 +13,8 @@ use glam::DVec3;
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn occupancy_update(subject: &Subject) -> Result<Tally> {
-    let mut tally = Tally::new(
+pub fn occupancy_update(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result = CheckResult::new(
         "occupancy",
         2e-5,
         "e^s turns the rounding of a log-density of up to 15 into a relative one",
@@ -24,15 +24,15 @@ pub fn occupancy_update(subject: &Subject) -> Result<Tally> {
         setup.config.batch.samples = 1000;
         setup.config.occupancy.threshold = limit;
         setup.config.occupancy.decay = 0.9;
-        let bench = subject.workbench(setup)?;
+        let bench = adapter.workbench(setup)?;
         let mut random = Random::new(60);
         bench.randomise(&mut random, 1.0, 2.0)?;
         let mut update = occupancy::Update::new(&bench.gpu, &bench.plan, &bench.workspace)?;
         let want = visited(&bench, &mut update, &mut random)?;
         bench.run(update.bits())?;
-        compare(&mut tally, &bench, &want, limit)?;
+        compare(&mut result, &bench, &want, limit)?;
     }
-    Ok(tally)
+    Ok(result)
 }
 
 /// Visits cells on the device in chunks of odd sizes and strides, the last one up to the end of the grid; returns
@@ -77,30 +77,30 @@ fn value_of(bench: &Workbench, model: &Model, cell: usize, old: f64) -> f64 {
     visit(old, raw, plan.least_step())
 }
 
-fn compare(tally: &mut Tally, bench: &Workbench, want: &[f64], limit: f64) -> Result<()> {
+fn compare(result: &mut CheckResult, bench: &Workbench, want: &[f64], limit: f64) -> Result<()> {
     let cells = want.len();
     let cascades = bench.plan.space.cascades();
     let got: Vec<f32> = bench.read("occupancy", cells)?;
     // Values of a tenth and more; those below are visited from a position whose rounding counts.
     let faded: Vec<f64> = want.iter().map(|&value| fade(value, bench.plan.config.occupancy.decay)).collect();
-    tally.each(&format!("value, {cascades} cascades"), &got, &faded, |cell| want[cell].abs().max(0.05));
+    result.each(&format!("value, {cascades} cascades"), &got, &faded, |cell| want[cell].abs().max(0.05));
     let unseen = got.iter().step_by(5).all(|&value| value == UNSEEN as f32);
-    tally.holds(unseen, || "cells that no camera sees".into());
+    result.holds(unseen, || "cells that no camera sees".into());
     let mean: Vec<f32> = bench.read("occupancy_mean", 1)?;
     let seen = want.iter().filter(|&&value| value >= 0.0);
     let want_mean = seen.clone().sum::<f64>() / seen.count() as f64;
-    tally.each("mean of the seen cells", &mean, &[want_mean], |_| want_mean);
+    result.each("mean of the seen cells", &mean, &[want_mean], |_| want_mean);
     let limit = threshold(want, limit);
-    tally.holds((limit < 0.5 * want_mean) == (cascades == 1), || {
+    result.holds((limit < 0.5 * want_mean) == (cascades == 1), || {
         "one case by the limit, one by the mean".into()
     });
     let (got, bits) = (bench.read::<u32>("occupancy_bits", cells / 32)?, bits(want, limit));
     let mut set = 0;
     for cell in (0..cells).filter(|&cell| (want[cell] / limit - 1.0).abs() > 1e-4) {
         let same = is_set(&got, cell) == is_set(&bits, cell);
-        tally.holds(same, || format!("bit of cell {cell}, value {}", want[cell]));
+        result.holds(same, || format!("bit of cell {cell}, value {}", want[cell]));
         set += usize::from(is_set(&got, cell));
     }
-    tally.holds(set > 0 && set < cells, || format!("{set} of {cells} cells are occupied"));
+    result.holds(set > 0 && set < cells, || format!("{set} of {cells} cells are occupied"));
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Functions of the kernels on their own, in a kernel that only evaluates them.
 
-use super::{Setup, Subject};
+use super::{CheckedAdapter, Setup};
 use crate::camera::LensKind;
 use crate::field::{Link, Workspace};
 use crate::gpu::pass::Stage;
@@ -20,13 +20,13 @@ impl Probe<'_> {
     /// The outputs, `[cases, OUTPUTS]`, at inputs `[cases, INPUTS]`.
     pub(super) fn evaluate<const INPUTS: usize, const OUTPUTS: usize>(
         &self,
-        subject: &Subject,
+        adapter: &CheckedAdapter,
         inputs: &[[[f32; 4]; INPUTS]],
     ) -> Result<Vec<[[f32; 4]; OUTPUTS]>> {
-        let gpu = &subject.gpu;
+        let gpu = &adapter.gpu;
         let mut setup = Setup::tiny();
-        setup.needs.lenses = LensKind::ALL.into();
-        let plan = subject.setup(setup).plan(gpu)?;
+        setup.features.lenses = LensKind::ALL.into();
+        let plan = adapter.setup(setup).plan(gpu)?;
         let cases = inputs.len();
         let text = format!(
             "// needs: {}\n\

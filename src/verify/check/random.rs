@@ -1,8 +1,8 @@
 //! Random numbers: the same integers on the device and in the reference.
 
-use super::draw::{SEED, STEP, quiet_step};
+use super::inputs::{SEED, STEP, quiet_step};
 use super::probe::Probe;
-use super::{Subject, Tally};
+use super::{CheckResult, CheckedAdapter};
 use crate::verify::reference::random::{pcg, random_u32, uniform};
 use anyhow::Result;
 
@@ -12,8 +12,8 @@ const COUNT: usize = 4096;
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
-pub fn random_numbers(subject: &Subject) -> Result<Tally> {
-    let mut tally = Tally::new("random numbers", 0.0, "integers are exact");
+pub fn random_numbers(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result = CheckResult::new("random numbers", 0.0, "integers are exact");
     // Halves of 16 bits, which floats hold exactly.
     let body = format!(
         "let i = u32(input(0u).x);\n\
@@ -24,7 +24,7 @@ pub fn random_numbers(subject: &Subject) -> Result<Tally> {
         stream = quiet_step().stream
     );
     let inputs: Vec<_> = (0..COUNT).map(|i| [[i as f32, 0.0, 0.0, 0.0]]).collect();
-    let outputs = Probe { needs: "random", variants: &[], body: &body }.evaluate::<1, 2>(subject, &inputs)?;
+    let outputs = Probe { needs: "random", variants: &[], body: &body }.evaluate::<1, 2>(adapter, &inputs)?;
     for (i, [halves, [float, ..]]) in outputs.into_iter().enumerate() {
         let index = i as u32;
         let mixed = pcg(index.wrapping_mul(1_048_573));
@@ -33,10 +33,10 @@ pub fn random_numbers(subject: &Subject) -> Result<Tally> {
             [("pcg", [halves[0], halves[1]], mixed), ("random_u32", [halves[2], halves[3]], drawn)]
         {
             let got = f64::from(high) * 65536.0 + f64::from(low);
-            tally.value(got, f64::from(want), 1.0, || format!("{name}, number {i}"));
+            result.value(got, f64::from(want), 1.0, || format!("{name}, number {i}"));
         }
         let want = f64::from(uniform(random_u32(SEED, STEP, index, 3)));
-        tally.value(f64::from(float), want, 1.0, || format!("random_f32, number {i}"));
+        result.value(f64::from(float), want, 1.0, || format!("random_f32, number {i}"));
     }
-    Ok(tally)
+    Ok(result)
 }

@@ -1,13 +1,13 @@
-//! Rays through pixels: those of a view through every lens, and those of a training with their targets.
+//! Rays through pixels: those of a view through every lens, and those of a training run with their targets.
 
-mod training;
-mod view;
+mod training_rays;
+mod view_rays;
 
-pub use training::{drawn, training_rays};
-pub use view::{sharp_rays, view_rays};
+pub use training_rays::{drawn, training_rays};
+pub use view_rays::{sharp_rays, view_rays};
 
 use super::Workbench;
-use super::draw::Random;
+use super::inputs::Random;
 use crate::camera::Bounds;
 use crate::camera::{Camera, Lens, LensKind};
 use crate::field::{self, Progress};
@@ -48,10 +48,10 @@ impl DeviceRay {
 
 /// A camera of one pixel whose only ray goes along `direction`, all of it in box space.
 #[must_use]
-pub fn pixel_camera(origin: DVec3, direction: DVec3) -> field::Camera {
+pub fn pixel_camera(origin: DVec3, direction: DVec3) -> field::DeviceCamera {
     let right = direction.any_orthonormal_vector();
     let array = |vector: DVec3| vector.as_vec3().to_array();
-    field::Camera {
+    field::DeviceCamera {
         origin: array(origin),
         width: 1,
         right: array(right),
@@ -60,7 +60,7 @@ pub fn pixel_camera(origin: DVec3, direction: DVec3) -> field::Camera {
         back: array(-direction),
         focal_px: [1.0; 2],
         center_px: [0.5; 2],
-        ..field::Camera::default()
+        ..field::DeviceCamera::default()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Which samples get colour: select, scan and pack.
 
-use super::draw::{Random, random_batch, uniform};
-use super::{Kept, Setup, Subject, Tally, Workbench};
+use super::inputs::{Random, random_batch, uniform};
+use super::{CheckResult, CheckedAdapter, KeptSample, Setup, Workbench};
 use crate::field::{color, dimension};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::activation::{MAX_LOG_DENSITY, log_density};
@@ -27,37 +27,37 @@ pub struct Selecting {
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn selected_samples(subject: &Subject) -> Result<Tally> {
-    let mut tally =
-        Tally::new("selection", 3e-6, "a weight over the floor, and its sum along the ray, round");
+pub fn selected_samples(adapter: &CheckedAdapter) -> Result<CheckResult> {
+    let mut result =
+        CheckResult::new("selection", 3e-6, "a weight over the floor, and its sum along the ray, round");
     let mut random = Random::new(30);
-    let ordinary = Selecting::new(subject, setup())?;
+    let ordinary = Selecting::new(adapter, setup())?;
     for (rays, samples) in [(3, 0), (1, 1), (2, 3), (9, 65), (33, 130), (200, 250)] {
         let rays = random_batch(&mut random, rays, samples);
         let raw = raw_densities(&mut random, samples);
-        ordinary.compare(&mut tally, &rays, &raw)?;
+        ordinary.compare(&mut result, &rays, &raw)?;
     }
     let mut dense = setup();
     dense.config.selection.weight_floor = 0.0;
-    let dense = Selecting::new(subject, dense)?;
+    let dense = Selecting::new(adapter, dense)?;
     let rays = random_batch(&mut random, 60, 380);
-    let kept = dense.compare(&mut tally, &rays, &random.numbers(380, 2.0, 3.0))?;
-    tally.holds(kept < 380, || "no ray ends in a fog".into());
+    let kept = dense.compare(&mut result, &rays, &random.numbers(380, 2.0, 3.0))?;
+    result.holds(kept < 380, || "no ray ends in a fog".into());
     for (floor, light_share) in [(1.0, 1.0), (0.05, 0.01), (0.0, 1.0)] {
         let mut setup = setup();
         setup.config.selection.light_share = light_share;
         setup.config.selection.weight_floor = floor;
         setup.config.selection.stop_transmittance = 0.0;
-        let selecting = Selecting::new(subject, setup)?;
+        let selecting = Selecting::new(adapter, setup)?;
         let rays = random_batch(&mut random, 33, 130);
         let raw: Vec<f32> = raw_densities(&mut random, 130).into_iter().map(|raw| raw.min(0.0)).collect();
         let first = selecting.first_occupancy();
         selecting.bench.write("occupancy", &first);
-        let kept = selecting.compare(&mut tally, &rays, &raw)?;
-        selecting.compare_occupancy(&mut tally, &first, (&rays, &raw))?;
-        tally.holds((kept == 130) == (floor == 0.0), || format!("{kept} kept with a floor of {floor}"));
+        let kept = selecting.compare(&mut result, &rays, &raw)?;
+        selecting.compare_occupancy(&mut result, &first, (&rays, &raw))?;
+        result.holds((kept == 130) == (floor == 0.0), || format!("{kept} kept with a floor of {floor}"));
     }
-    Ok(tally)
+    Ok(result)
 }
 
 /// A selection like the default one, of numbers that f32 holds.
@@ -84,10 +84,10 @@ impl Selecting {
     ///
     /// # Errors
     /// When the adapter cannot hold it or refuses a kernel.
-    pub fn new(subject: &Subject, setup: Setup) -> Result<Self> {
-        let bench = subject.workbench(setup)?;
+    pub fn new(adapter: &CheckedAdapter, setup: Setup) -> Result<Self> {
+        let bench = adapter.workbench(setup)?;
         let mut stages =
-            color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::Selection::Training)?;
+            color::stages(&bench.gpu, &bench.plan, &bench.workspace, color::SelectionMode::Training)?;
         stages.truncate(STAGES);
         Ok(Self { bench, stages })
     }
@@ -110,7 +110,7 @@ impl Selecting {
     /// Every marched sample of rays without an end raises its cell, whatever is kept.
     fn compare_occupancy(
         &self,
-        tally: &mut Tally,
+        result: &mut CheckResult,
         first: &[f32],
         (rays, raw): (&[TrainingRay], &[f32]),
     ) -> Result<()> {
@@ -125,37 +125,37 @@ impl Selecting {
             *cell = visit(*cell, raw.into(), plan.least_step());
         }
         let got: Vec<f32> = self.bench.read("occupancy", want.len())?;
-        tally.each("occupancy", &got, &want, |cell| want[cell].abs().max(1e-6));
+        result.each("occupancy", &got, &want, |cell| want[cell].abs().max(1e-6));
         let raised = want.iter().zip(first).filter(|(now, then)| **now > f64::from(**then)).count();
-        tally.holds(raised > 20, || format!("{raised} cells were raised"));
+        result.holds(raised > 20, || format!("{raised} cells were raised"));
         Ok(())
     }
 
     /// Compares with the reference; returns how many samples were kept.
-    fn compare(&self, tally: &mut Tally, rays: &[TrainingRay], raw: &[f32]) -> Result<usize> {
+    fn compare(&self, result: &mut CheckResult, rays: &[TrainingRay], raw: &[f32]) -> Result<usize> {
         self.run(rays, raw)?;
         let counters = self.bench.counters()?;
         let kept = counters.kept as usize;
         let all_used = counters.rays_used as usize == rays.len() && counters.kept_wanted == counters.kept;
-        tally.holds(all_used, || format!("{counters:?}"));
+        result.holds(all_used, || format!("{counters:?}"));
         let spans: Vec<[u32; 2]> = self.bench.read("kept_spans", rays.len())?;
         let all = self.bench.kept(kept)?;
         let (mut first, mut packed, mut close) = (0, 0, 0);
         for (number, (ray, span)) in rays.iter().zip(&spans).enumerate() {
             let [begin, count] = span.map(|x| x as usize);
             let is_packed = begin == packed && begin + count <= kept;
-            tally.holds(is_packed, || format!("ray {number} is not behind the one before"));
+            result.holds(is_packed, || format!("ray {number} is not behind the one before"));
             if !is_packed {
                 return Ok(kept);
             }
             packed += count;
             let raw = &raw[first..first + ray.samples.len()];
             let chosen = Chosen { number, ray, raw, first, kept: &all[begin..packed] };
-            close += usize::from(!chosen.compare(tally, self.reference(&chosen)));
+            close += usize::from(!chosen.compare(result, self.reference(&chosen)));
             first += ray.samples.len();
         }
-        tally.holds(packed == kept, || format!("{packed} of {kept} belong to rays"));
-        tally.holds(close * 10 <= rays.len(), || format!("{close} of {} too close to call", rays.len()));
+        result.holds(packed == kept, || format!("{packed} of {kept} belong to rays"));
+        result.holds(close * 10 <= rays.len(), || format!("{close} of {} too close to call", rays.len()));
         Ok(kept)
     }
 
@@ -203,23 +203,24 @@ struct Chosen<'a> {
     raw: &'a [f32],
     /// Its first sample.
     first: usize,
-    kept: &'a [Kept],
+    kept: &'a [KeptSample],
 }
 
 impl Chosen<'_> {
     /// Compares with what the reference keeps; false where that is not sure.
-    fn compare(&self, tally: &mut Tally, want: Option<Vec<selection::Kept>>) -> bool {
+    fn compare(&self, result: &mut CheckResult, want: Option<Vec<selection::Kept>>) -> bool {
         let Self { number, ray, raw, first, .. } = *self;
         let case = || format!("ray {number} of {} samples", ray.samples.len());
         for kept in self.kept {
             let raw = raw.get((kept.sample as usize).wrapping_sub(first));
             let s = raw.map(|raw| raw.min(MAX_LOG_DENSITY as f32));
-            tally.holds(kept.ray as usize == number && s == Some(kept.s), || format!("{}: {kept:?}", case()));
+            result
+                .holds(kept.ray as usize == number && s == Some(kept.s), || format!("{}: {kept:?}", case()));
         }
         let Some(want) = want else { return false };
         let samples = self.kept.iter().map(|kept| kept.sample as usize);
         let same = samples.eq(want.iter().map(|kept| first + kept.index));
-        tally.holds(same, || format!("{}: other samples than {want:?}", case()));
+        result.holds(same, || format!("{}: other samples than {want:?}", case()));
         if same {
             let depths: Vec<f64> = (raw.iter().zip(&ray.samples))
                 .map(|(&raw, sample)| optical_depth(log_density(f64::from(raw)), sample.delta))
@@ -227,12 +228,12 @@ impl Chosen<'_> {
             let mut behind = 0;
             for (got, want) in self.kept.iter().zip(&want) {
                 let delta = ray.samples[want.index].delta;
-                tally.value(got.delta.into(), delta, delta, || format!("{}: step", case()));
+                result.value(got.delta.into(), delta, delta, || format!("{}: step", case()));
                 let size = |estimate: usize| 1.0 + want.gains[estimate];
-                tally.each(&format!("{}: gains", case()), &got.gains, &want.gains, size);
+                result.each(&format!("{}: gains", case()), &got.gains, &want.gains, size);
                 let gap: f64 = depths[behind..want.index].iter().sum();
                 let before: f64 = depths[..want.index].iter().sum();
-                tally.value(got.gap.into(), gap, 1.0 + before, || format!("{}: gap", case()));
+                result.value(got.gap.into(), gap, 1.0 + before, || format!("{}: gap", case()));
                 behind = want.index + 1;
             }
         }

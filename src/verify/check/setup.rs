@@ -1,15 +1,13 @@
 //! What a workbench is built from.
 
-use super::draw::SEED;
+use super::inputs::SEED;
 use crate::camera::Bounds;
-use crate::config::{
-    self, Accumulation, Batch, Config, Grid, March, Network, Occupancy, Optimizer, Selection,
-};
+use crate::config::Transmittance;
+use crate::config::{Accumulation, Batch, Config, Grid, March, Network, Occupancy, Optimizer, Selection};
 use crate::field::layer::Product;
 use crate::field::{Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
-use crate::gpu::tensor::Memory;
-use crate::verify::reference::Transmittance;
+use crate::gpu::tensor::TensorMemory;
 use anyhow::Result;
 use glam::DVec3;
 
@@ -19,13 +17,13 @@ pub struct Setup {
     /// Sizes and constants of the field.
     pub config: Config,
     /// What the scene needs.
-    pub needs: SceneFeatures,
+    pub features: SceneFeatures,
     /// The scene's box.
     pub bounds: Bounds,
     /// How matrix products are written; `None` as the plan chooses.
     pub product: Option<Product>,
     /// Where tensors live; `None` as the plan chooses.
-    pub memory: Option<Memory>,
+    pub memory: Option<TensorMemory>,
 }
 
 impl Setup {
@@ -51,9 +49,9 @@ impl Setup {
             seed: SEED,
             ..Config::default()
         };
-        let needs = SceneFeatures { alpha: true, ..SceneFeatures::default() };
+        let features = SceneFeatures { alpha: true, ..SceneFeatures::default() };
         let bounds = Bounds { center: DVec3::splat(0.5), half: 0.5, cascades: 1, source: "unit cube".into() };
-        Self { config, needs, bounds, product: None, memory: None }
+        Self { config, features, bounds, product: None, memory: None }
     }
 
     /// With hidden layers of `width`, `color_layers` of them in the colour network.
@@ -73,7 +71,7 @@ impl Setup {
     /// With linear light where `hdr`.
     #[must_use]
     pub fn hdr(mut self, hdr: bool) -> Self {
-        self.needs.hdr = hdr;
+        self.features.hdr = hdr;
         self
     }
 
@@ -87,10 +85,7 @@ impl Setup {
     /// In this convention.
     #[must_use]
     pub fn transmittance(mut self, transmittance: Transmittance) -> Self {
-        self.config.transmittance = match transmittance {
-            Transmittance::Exclusive => config::Transmittance::Exclusive,
-            Transmittance::Inclusive => config::Transmittance::Inclusive,
-        };
+        self.config.transmittance = transmittance;
         self
     }
 
@@ -101,7 +96,7 @@ impl Setup {
     pub fn plan(&self, gpu: &Gpu) -> Result<Plan> {
         self.config.validate()?;
         let space = Space::from(&self.bounds);
-        let mut plan = Plan::new(gpu, self.config.clone(), self.needs.clone(), space);
+        let mut plan = Plan::new(gpu, self.config.clone(), self.features.clone(), space);
         plan.product = self.product.unwrap_or(plan.product);
         plan.memory = self.memory.unwrap_or(plan.memory);
         Ok(plan)

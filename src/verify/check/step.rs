@@ -1,22 +1,22 @@
 //! Whole training steps of a tiny field, through the trainer, on the samples that the device chose.
 
-use super::draw::Random;
-use super::tally::largest;
-use super::{Setup, Subject, Tally, Workbench};
+use super::check_result::largest;
+use super::inputs::Random;
+use super::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::camera::{Camera, Lens};
+use crate::config::Transmittance;
 use crate::config::{Background, Loss, Optimizer, Selection};
 use crate::field::layout::DENSITY_OUTPUTS;
-use crate::field::train::{StepStats, Trainer};
-use crate::field::views::Views;
+use crate::field::trainer::{StepStats, Trainer};
+use crate::field::training_views::TrainingViews;
 use crate::field::{Field, RayTarget, STEP_GROWTH, STEP_SHRINKAGE, SceneFeatures};
 use crate::photo::Photo;
 use crate::photo::{Image, Pixels};
-use crate::verify::reference::Transmittance;
 use crate::verify::reference::activation::log_density;
 use crate::verify::reference::adam::Adam;
 use crate::verify::reference::composite::optical_depth;
 use crate::verify::reference::model::{BatchOutput, Model, RaySample, TrainingRay};
-use crate::verify::reference::step::Training;
+use crate::verify::reference::step::ModelTraining;
 use anyhow::Result;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -42,7 +42,7 @@ pub fn setups() -> [(&'static str, Setup); 5] {
     let cascades = Setup::tiny().network(32, 1).hdr(true).cascades(3);
     let mut masks = Setup::tiny();
     masks.config.loss = Loss { depth: 0.3, distortion: 0.02, sparsity: 0.01, ..Loss::default() };
-    (masks.needs.deep, masks.needs.masks, masks.needs.depth) = (true, true, true);
+    (masks.features.deep, masks.features.masks, masks.features.depth) = (true, true, true);
     [
         ("plain", Setup::tiny()),
         ("random background", random_background),
@@ -56,11 +56,14 @@ pub fn setups() -> [(&'static str, Setup); 5] {
 ///
 /// # Errors
 /// When the device was lost or refuses a kernel.
-pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
-    let mut tally =
-        Tally::new("one whole step", 5e-6, "gradients of all kernels, relative to the largest of their kind");
+pub fn one_step(adapter: &CheckedAdapter, setups: &[(&str, Setup)]) -> Result<CheckResult> {
+    let mut result = CheckResult::new(
+        "one whole step",
+        5e-6,
+        "gradients of all kernels, relative to the largest of their kind",
+    );
     for (name, setup) in setups {
-        let mut tiny = TinyTraining::new(subject, setup.clone())?;
+        let mut tiny = TinyTraining::new(adapter, setup.clone())?;
         // Larger features than the initial ones, so that every gradient matters.
         tiny.bench.randomise(&mut Random::new(81), 0.5, 1.0)?;
         let mut reference = tiny.reference()?;
@@ -71,20 +74,20 @@ pub fn one_step(subject: &Subject, setups: &[(&str, Setup)]) -> Result<Tally> {
         let counted = [stats.steps, stats.skipped] == [1, 0]
             && stats.rays == batch.len() as u64
             && stats.samples == samples as u64;
-        tally.holds(counted, || format!("{name}: {stats:?}, {} rays, {samples} samples", batch.len()));
+        result.holds(counted, || format!("{name}: {stats:?}, {} rays, {samples} samples", batch.len()));
         let filled = batch.len() >= 16 && batch.iter().any(|ray| ray.samples.len() > 3);
         let thinned =
             reference.objective.transmittance == Transmittance::Inclusive || tiny.representatives()? > 3;
-        tally.holds(filled && thinned, || format!("{name}: a thin batch"));
+        result.holds(filled && thinned, || format!("{name}: a thin batch"));
         let want = reference.step(&batch, LEARNING_RATE);
-        tally.value(stats.loss, want.loss, want.loss, || format!("{name}: loss"));
+        result.value(stats.loss, want.loss, want.loss, || format!("{name}: loss"));
         let error = color_error(&want);
-        tally.value(stats.color_error, error, error, || format!("{name}: colour error"));
-        compare_rays(&mut tally, name, &tiny.bench)?;
-        compare_moments(&mut tally, name, &tiny.bench, &reference)?;
-        compare_parameters(&mut tally, name, [&before, &tiny.bench.model()?], &reference, &want);
+        result.value(stats.color_error, error, error, || format!("{name}: colour error"));
+        compare_rays(&mut result, name, &tiny.bench)?;
+        compare_moments(&mut result, name, &tiny.bench, &reference)?;
+        compare_parameters(&mut result, name, [&before, &tiny.bench.model()?], &reference, &want);
     }
-    Ok(tally)
+    Ok(result)
 }
 
 /// Mean squared error of red, green and blue, as they count.
@@ -94,7 +97,7 @@ fn color_error(output: &BatchOutput) -> f64 {
 }
 
 /// The number of rays of the next step and the length of their steps, which follow how many samples this one's rays had.
-fn compare_rays(tally: &mut Tally, name: &str, bench: &Workbench) -> Result<()> {
+fn compare_rays(result: &mut CheckResult, name: &str, bench: &Workbench) -> Result<()> {
     let counters = bench.counters()?;
     let batch = &bench.plan.config.batch;
     let asked = f64::from(batch.first_rays);
@@ -103,40 +106,46 @@ fn compare_rays(tally: &mut Tally, name: &str, bench: &Workbench) -> Result<()> 
     let fit_samples = (batch.samples / 8 * 7) as f64 / f64::from(counters.samples_wanted.max(1));
     let want = (asked * fit_kept.min(fit_samples).clamp(0.5, 1.5)).clamp(16.0, batch.rays as f64);
     let got = f64::from(counters.rays);
-    tally.holds((got - want).abs() <= 1.0, || format!("{name}: {got} rays next instead of {want}"));
+    result.holds((got - want).abs() <= 1.0, || format!("{name}: {got} rays next instead of {want}"));
     let march = &bench.plan.config.march;
     let crowding = f64::from(counters.samples_wanted) / (asked * march.samples_per_ray);
     let scale = march.longest_step * crowding.clamp(STEP_SHRINKAGE, STEP_GROWTH);
     let scale = scale.clamp(1.0, march.longest_step);
-    tally.value(1.0 + f64::from(counters.step_excess), scale, scale, || format!("{name}: length of steps"));
+    result.value(1.0 + f64::from(counters.step_excess), scale, scale, || format!("{name}: length of steps"));
     Ok(())
 }
 
 /// β1 = 0.9: the first moment is a tenth of the gradient.
-fn compare_moments(tally: &mut Tally, name: &str, bench: &Workbench, reference: &Training) -> Result<()> {
+fn compare_moments(
+    result: &mut CheckResult,
+    name: &str,
+    bench: &Workbench,
+    reference: &ModelTraining,
+) -> Result<()> {
     let [first, _] = bench.table_moments()?;
-    tally.all(&format!("{name}: gradient of the table"), &first, &reference.table_moments.first);
+    result.all(&format!("{name}: gradient of the table"), &first, &reference.table_moments.first);
     let moments = reference.density_moments.iter().chain(&reference.color_moments);
     for (layer, (got, want)) in bench.weights("mlp_first")?.iter().zip(moments).enumerate() {
         let used = got.get(..want.first.len()).unwrap_or(got);
-        tally.all(&format!("{name}: gradient of layer {layer}"), used, &want.first);
+        result.all(&format!("{name}: gradient of layer {layer}"), used, &want.first);
     }
     Ok(())
 }
 
 /// Adam's first step is the gradient's sign: only gradients well above rounding decide it.
 fn compare_parameters(
-    tally: &mut Tally,
+    result: &mut CheckResult,
     name: &str,
     [before, now]: [&Model; 2],
-    reference: &Training,
+    reference: &ModelTraining,
     want: &BatchOutput,
 ) {
     let mut compare = |part: &str, got: &[f64], want: &[f64], gradient: &[f64]| {
         let least = 1e-3 * largest(gradient);
         let clear = (0..gradient.len()).filter(|&i| gradient[i].abs() > least);
-        clear
-            .for_each(|i| tally.value(got[i], want[i], 1.0, || format!("{name}: {part} {i} after the step")));
+        clear.for_each(|i| {
+            result.value(got[i], want[i], 1.0, || format!("{name}: {part} {i} after the step"));
+        });
     };
     let (gradients, trained) = (&want.gradients, &reference.model);
     compare("table entry", &now.table, &trained.table, &gradients.table);
@@ -150,7 +159,7 @@ fn compare_parameters(
     }
     let mut untouched = (0..before.table.len()).filter(|&i| gradients.table[i] == 0.0);
     let same = untouched.all(|i| before.table[i] == now.table[i]);
-    tally.holds(same, || format!("{name}: table entries that no sample touches"));
+    result.holds(same, || format!("{name}: table entries that no sample touches"));
 }
 
 impl TinyTraining {
@@ -158,8 +167,8 @@ impl TinyTraining {
     ///
     /// # Errors
     /// When the adapter cannot hold it or refuses a kernel.
-    pub fn new(subject: &Subject, setup: Setup) -> Result<Self> {
-        let mut setup = subject.setup(setup);
+    pub fn new(adapter: &CheckedAdapter, setup: Setup) -> Result<Self> {
+        let mut setup = adapter.setup(setup);
         let cameras = cameras();
         setup.config.optimizer = Optimizer::default();
         // High enough that every batch has light samples, of which some are dropped.
@@ -168,11 +177,12 @@ impl TinyTraining {
         setup.config.batch.kept = 1024;
         setup.config.batch.samples = 4096;
         let mut random = Random::new(80);
-        let photos: Vec<_> = cameras.iter().map(|camera| photo(&mut random, camera, &setup.needs)).collect();
-        let plan = setup.plan(&subject.gpu)?;
-        let mut views = Views::new(&subject.gpu, &plan, &cameras)?;
+        let photos: Vec<_> =
+            cameras.iter().map(|camera| photo(&mut random, camera, &setup.features)).collect();
+        let plan = setup.plan(&adapter.gpu)?;
+        let mut views = TrainingViews::new(&adapter.gpu, &plan, &cameras)?;
         photos.iter().try_for_each(|photo| views.add(photo))?;
-        let trainer = Trainer::new(Field::new(&subject.gpu, plan)?, views)?;
+        let trainer = Trainer::new(Field::new(&adapter.gpu, plan)?, views)?;
         let bench = Workbench::of(trainer.field().clone(), trainer.workspace().clone())?;
         Ok(Self { trainer, bench })
     }
@@ -181,9 +191,9 @@ impl TinyTraining {
     ///
     /// # Errors
     /// When the device was lost.
-    pub fn reference(&self) -> Result<Training> {
+    pub fn reference(&self) -> Result<ModelTraining> {
         let config = &self.bench.plan.config.optimizer;
-        let mut training = Training::new(self.bench.model()?, self.bench.objective());
+        let mut training = ModelTraining::new(self.bench.model()?, self.bench.objective());
         let constants = |l2, skip_zero| Adam {
             beta1: config.beta_1,
             beta2: config.beta_2,
@@ -282,12 +292,12 @@ fn cameras() -> Vec<Camera> {
 
 /// About one colour with a little noise: something that a tiny field can learn. Some pixels are ignored, and of some
 /// the depth is not known.
-fn photo(random: &mut Random, camera: &Camera, needs: &SceneFeatures) -> Photo {
+fn photo(random: &mut Random, camera: &Camera, features: &SceneFeatures) -> Photo {
     let count = camera.width * camera.height;
-    let pixels = if needs.hdr {
+    let pixels = if features.hdr {
         let pixel = |_| [4.0, 2.5, 0.5, 0.9].map(|x| (x * random.number(0.8, 1.0)) as f32);
         Pixels::Linear((0..count).map(pixel).collect())
-    } else if needs.deep {
+    } else if features.deep {
         let pixel = |_| [65_000.0, 40_000.0, 5_000.0, 60_000.0].map(|x| (x * random.number(0.8, 1.0)) as u16);
         Pixels::Srgb16((0..count).map(pixel).collect())
     } else {
@@ -296,10 +306,10 @@ fn photo(random: &mut Random, camera: &Camera, needs: &SceneFeatures) -> Photo {
     };
     let image = Image { width: camera.width, height: camera.height, pixels, has_alpha: true };
     let mut photo = Photo::from(image);
-    if needs.masks {
+    if features.masks {
         photo.ignored = (0..count).map(|pixel| pixel % 3 == 0).collect();
     }
-    if needs.depth {
+    if features.depth {
         let depth = |pixel| if pixel % 5 == 0 { 0.0 } else { random.number(1.0, 2.0) as f32 };
         photo.depth = (0..count).map(depth).collect();
     }

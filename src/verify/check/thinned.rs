@@ -1,12 +1,12 @@
 //! The fused kernel on rays of which samples were left out.
 
-use super::Tally;
-use super::draw::Random;
+use super::CheckResult;
+use super::checked_adapter::CheckedAdapter;
 use super::fused::{BOUND, Fused, SAMPLES};
-use super::hard_rays::HardRay;
-use super::subject::Subject;
+use super::inputs::Random;
+use super::stress_rays::StressRay;
 use super::workbench::KeptStep;
-use crate::verify::reference::Transmittance;
+use crate::config::Transmittance;
 use crate::verify::reference::composite::{
     CompositeInput, CompositeOutput, opacity, optical_depths, transmittances,
 };
@@ -20,9 +20,9 @@ const LENGTHS: [usize; 8] = [0, 1, 2, 3, 7, 20, 60, 130];
 /// Smaller colours and gradients may vanish in single precision.
 const LEAST: f64 = 1e-30;
 
-/// A hard ray whose samples were kept.
+/// A stress ray whose samples were kept.
 struct ThinnedRay {
-    ray: HardRay,
+    ray: StressRay,
     /// Optical depth of what was left out in front of each sample, and behind the last.
     gaps: Vec<f64>,
     tail: f64,
@@ -33,30 +33,30 @@ struct ThinnedRay {
 ///
 /// # Errors
 /// When the device was lost or refuses the kernel.
-pub fn thinned_rays(subject: &Subject) -> Result<Tally> {
+pub fn thinned_rays(adapter: &CheckedAdapter) -> Result<CheckResult> {
     let source = "as above; what a gap hides rounds as if it were seen";
-    let mut tally = Tally::new("render, loss, gradient: thinned", BOUND, source);
+    let mut result = CheckResult::new("render, loss, gradient: thinned", BOUND, source);
     let mut random = Random::new(2);
-    let fused = Fused::new(subject, Transmittance::Exclusive, SAMPLES)?;
+    let fused = Fused::new(adapter, Transmittance::Exclusive, SAMPLES)?;
     for length in LENGTHS {
         let rays: Vec<_> =
-            (0..4 * HardRay::KINDS).map(|number| ThinnedRay::new(&mut random, number, length)).collect();
+            (0..4 * StressRay::KINDS).map(|number| ThinnedRay::new(&mut random, number, length)).collect();
         let inputs: Vec<_> = rays.iter().map(|ray| ray.ray.input(rays.len() as u32)).collect();
         let spans = fused.upload(&inputs);
         fused.bench.write("kept_steps", &rays.iter().flat_map(ThinnedRay::steps).collect::<Vec<_>>());
         fused.bench.write("ray_tails", &rays.iter().map(|ray| ray.tail as f32).collect::<Vec<_>>());
         for (ray, got) in rays.iter().zip(fused.outputs(&inputs, &spans)?) {
-            ray.compare(&mut tally, &got, rays.len() as u32);
+            ray.compare(&mut result, &got, rays.len() as u32);
         }
     }
-    Ok(tally)
+    Ok(result)
 }
 
 impl ThinnedRay {
     /// Gaps share a depth of up to 3, but for one in ten rays with a gap that nothing passes; each is a share of the rest
     /// of the ray's brightness at most, and so is the weight of a sample that stands for others.
     fn new(random: &mut Random, number: usize, samples: usize) -> Self {
-        let ray = HardRay::new(random, number, samples);
+        let ray = StressRay::new(random, number, samples);
         let depths = optical_depths(&ray.input(1));
         let single = |x: f64| f64::from(x as f32);
         let gap = |random: &mut Random| match random.number(0.0, 1.0) {
@@ -94,9 +94,9 @@ impl ThinnedRay {
     }
 
     /// The ray with a sample in each gap, and one behind the last of its own: sample `k` is the `2k + 1`st.
-    fn filled(&self) -> (HardRay, Vec<[f64; 2]>) {
+    fn filled(&self) -> (StressRay, Vec<[f64; 2]>) {
         let mut filled =
-            HardRay { target: self.ray.target, background: self.ray.background, ..HardRay::default() };
+            StressRay { target: self.ray.target, background: self.ray.background, ..StressRay::default() };
         let mut gains = Vec::new();
         let mut push = |s: f64, delta: f64, color: [f64; 3], gain: [f64; 2]| {
             filled.s.push(s);
@@ -112,7 +112,7 @@ impl ThinnedRay {
         (filled, gains)
     }
 
-    fn compare(&self, tally: &mut Tally, got: &CompositeOutput, rays: u32) {
+    fn compare(&self, result: &mut CheckResult, got: &CompositeOutput, rays: u32) {
         let (filled, gains) = self.filled();
         let input = filled.input(rays);
         let want =
@@ -120,13 +120,13 @@ impl ThinnedRay {
         let sizes = Sizes::new(&input, &gains);
         let case = |what: &str| format!("{what} of thinned '{}'", self.ray.name);
         let rendered = |x: usize| sizes.rendered[0][x].max(sizes.rendered[1][x]).max(LEAST);
-        tally.each(&case("R"), &got.rendered, &want.rendered, rendered);
-        tally.value(got.loss, want.loss, sizes.loss.max(LEAST), || case("loss"));
+        result.each(&case("R"), &got.rendered, &want.rendered, rendered);
+        result.value(got.loss, want.loss, sizes.loss.max(LEAST), || case("loss"));
         for k in 0..self.gaps.len() {
             let own = 2 * k + 1;
             let by_color = |x: usize| sizes.d_color[own][x].max(LEAST);
-            tally.each(&case("by colour"), &got.d_color[k], &want.d_color[own], by_color);
-            tally.value(got.d_s[k], want.d_s[own], sizes.d_s[own].max(LEAST), || case("by log-density"));
+            result.each(&case("by colour"), &got.d_color[k], &want.d_color[own], by_color);
+            result.value(got.d_s[k], want.d_s[own], sizes.d_s[own].max(LEAST), || case("by log-density"));
         }
     }
 }

@@ -1,14 +1,14 @@
 //! A device with a plan and all its buffers, on which kernels can be run one by one.
 
 use super::Setup;
-use super::draw::quiet_step;
+use super::inputs::quiet_step;
 use crate::field::layout::DENSITY_OUTPUTS;
 use crate::field::{
     Counters, Field, Plan, RayResult, RayTarget, Step, Workspace, backward, color, composite, density,
     dispatch, march, optimize, records,
 };
 use crate::gpu::Gpu;
-use crate::gpu::banks::{Banks, Capacity, rows_of};
+use crate::gpu::paged_array::{PageCapacity, PagedArray, rows_of};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::model::TrainingRay;
 use anyhow::{Context, Result, ensure};
@@ -31,15 +31,15 @@ pub struct Workbench {
     scan: Arc<Stage>,
 }
 
-/// Rows of a bank of photos: so few that some photos lie in two banks.
-const BANK_ROWS: usize = 3;
+/// Rows of a page of photos: so few that some photos lie in two pages.
+const PAGE_ROWS: usize = 3;
 
 /// A kept sample as `shaders/common/kept_load.wgsl` reads it.
 pub(super) type KeptStep = [[f32; 4]; 2];
 
 /// A kept sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Kept {
+pub struct KeptSample {
     /// Which of the marched samples.
     pub sample: u32,
     /// Its ray.
@@ -56,7 +56,7 @@ pub struct Kept {
 
 /// What one pass over a batch left on the device.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct PassOutput {
     /// Raw outputs of the density network, `[samples, 16]`.
     pub density: Vec<f32>,
     /// Activated colours, `[kept, 3]`.
@@ -168,11 +168,11 @@ impl Workbench {
     ///
     /// # Errors
     /// When the device was lost.
-    pub fn kept(&self, count: usize) -> Result<Vec<Kept>> {
+    pub fn kept(&self, count: usize) -> Result<Vec<KeptSample>> {
         let rows: Vec<[u32; 2]> = self.read("kept_rows", count)?;
         let steps: Vec<KeptStep> = self.read("kept_steps", count)?;
         Ok((rows.into_iter().zip(steps))
-            .map(|([sample, ray], [[s, delta, gap, _], [first, second, ..]])| Kept {
+            .map(|([sample, ray], [[s, delta, gap, _], [first, second, ..]])| KeptSample {
                 sample,
                 ray,
                 s,
@@ -241,18 +241,18 @@ impl Workbench {
         self.read("ray_results", rays)
     }
 
-    /// Puts these words of photos on the device, in banks of a few rows.
+    /// Puts these words of photos on the device, in pages of a few rows.
     ///
     /// # Errors
     /// When the adapter cannot hold them.
     pub fn add_photos(&mut self, words: &[u32]) -> Result<()> {
         let (capacity, rows) =
-            (Capacity::of(&self.gpu.device.limits(), self.plan.memory), rows_of(words.len()));
+            (PageCapacity::of(&self.gpu.device.limits(), self.plan.memory), rows_of(words.len()));
         // More where the adapter binds few of them.
-        let capacity = capacity.with_bank_rows(BANK_ROWS.max(rows.div_ceil(capacity.banks())));
-        let mut banks = Banks::new(&self.gpu, records::NAME, rows, capacity)?;
-        banks.write(&self.gpu, 0, words)?;
-        self.workspace.add_banks(banks);
+        let capacity = capacity.with_page_rows(PAGE_ROWS.max(rows.div_ceil(capacity.pages())));
+        let mut pages = PagedArray::new(&self.gpu, records::NAME, rows, capacity)?;
+        pages.write(&self.gpu, 0, words)?;
+        self.workspace.add_pages(pages);
         Ok(())
     }
 
@@ -287,7 +287,7 @@ impl Workbench {
     pub fn stages(&self) -> Result<Vec<Stage>> {
         let (gpu, plan, workspace) = (&self.gpu, &self.plan, &self.workspace);
         let mut stages = density::stages(gpu, plan, workspace)?;
-        stages.extend(color::stages(gpu, plan, workspace, color::Selection::Training)?);
+        stages.extend(color::stages(gpu, plan, workspace, color::SelectionMode::Training)?);
         stages.push(composite::stage(gpu, plan, workspace, true)?);
         stages.extend(backward::stages(gpu, plan, workspace)?);
         stages.extend(backward::weights(gpu, plan, workspace)?);
@@ -299,13 +299,13 @@ impl Workbench {
     ///
     /// # Errors
     /// As [`Workbench::upload`] and [`Workbench::run`].
-    pub fn train(&self, stages: &[Stage], rays: &[TrainingRay]) -> Result<Outcome> {
+    pub fn train(&self, stages: &[Stage], rays: &[TrainingRay]) -> Result<PassOutput> {
         self.clear_table_moments();
         self.upload(rays)?;
         self.run(stages)?;
         let counters = self.counters()?;
         let [d_table, _] = self.table_moments()?;
-        Ok(Outcome {
+        Ok(PassOutput {
             density: self.density(counters.samples as usize)?,
             color: self.color(counters.kept as usize)?,
             rendered: self.results(counters.rays_used as usize)?.iter().map(|ray| ray.rendered).collect(),

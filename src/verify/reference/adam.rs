@@ -24,7 +24,7 @@ pub struct Moments {
     pub second: Vec<f64>,
 }
 
-/// Where in the training an update happens.
+/// Where in training an update happens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
     /// Global number of the step, from 1.

@@ -19,7 +19,7 @@
 //! inclusive:  B_N = b,  dR/ds_i = τ_i T_i [(1 − 2α_i) c_i − B_i],    B_{i−1} = e^{−τ_i} (α_i c_i + B_i)
 //! ```
 
-use super::Transmittance;
+use crate::config::Transmittance;
 
 /// Opacity below which a ray has no depth.
 pub const MIN_DEPTH_OPACITY: f64 = 1e-3;

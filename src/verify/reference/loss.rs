@@ -40,9 +40,9 @@
 //! seen is left alone, since any price for it moves surfaces without texture. `1 − T` is a constant as far as gradients
 //! go.
 
-use super::Transmittance;
 use super::composite::{CompositeInput, CompositeOutput, composite, optical_depths, transmittances};
-use super::selection::{Estimate, thin};
+use super::selection::{EstimatedRay, thin};
+use crate::config::Transmittance;
 
 /// Added to the squared colour that an error is relative to.
 pub const RELATIVE_FLOOR: f64 = 0.01;
@@ -131,11 +131,11 @@ pub fn composite_with(
 fn add_errors(
     loss: Loss,
     ray: &CompositeInput,
-    [first, second]: &[Estimate; 2],
+    [first, second]: &[EstimatedRay; 2],
     output: &mut CompositeOutput,
 ) {
     let m = f64::from(ray.rays_in_batch.max(1));
-    let error = |estimate: &Estimate, x: usize| estimate.rendered[x] - ray.target[x];
+    let error = |estimate: &EstimatedRay, x: usize| estimate.rendered[x] - ray.target[x];
     output.rendered = std::array::from_fn(|x| 0.5 * (first.rendered[x] + second.rendered[x]));
     let v = loss.weights(output.rendered, ray.target);
     output.loss_terms = std::array::from_fn(|x| v[x] * error(first, x) * error(second, x));
@@ -160,7 +160,7 @@ struct Thinned<'a> {
 
 impl Thinned<'_> {
     /// The ray with a value per sample as its red, over 0.
-    fn weighted(&self, values: &[f64]) -> Estimate {
+    fn weighted(&self, values: &[f64]) -> EstimatedRay {
         let color: Vec<_> = values.iter().map(|&value| [value, 0.0, 0.0]).collect();
         let channel = CompositeInput { color: &color, background: [0.0; 3], ..*self.ray };
         thin(self.convention, &channel, &self.gains)

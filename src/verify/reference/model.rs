@@ -8,13 +8,14 @@
 
 use glam::DVec3;
 
+use super::ColorRange;
 use super::activation::{color, color_backward, log_density, log_density_backward};
 use super::composite::CompositeInput;
 use super::grid::{GridLevel, grid_encode, grid_encode_backward};
 use super::harmonics::harmonics;
 use super::loss::{Loss, Places, composite_with};
 use super::mlp::Mlp;
-use super::{ColorRange, Transmittance};
+use crate::config::Transmittance;
 
 /// The field's parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,12 +95,12 @@ pub struct BatchOutput {
 }
 
 /// The field at one position and direction, with what the way back needs.
-struct Evaluation {
+struct FieldValues {
     density: Vec<Vec<f64>>,
     color: Vec<Vec<f64>>,
 }
 
-impl Evaluation {
+impl FieldValues {
     /// The first output of the density network.
     fn raw_log_density(&self) -> f64 {
         last(&self.density)[0]
@@ -133,7 +134,7 @@ impl Model {
             },
         };
         for ray in rays {
-            let evaluations: Vec<Evaluation> =
+            let evaluations: Vec<FieldValues> =
                 (ray.samples.iter()).map(|sample| self.evaluate(sample.position, ray.direction)).collect();
             let distances = collect(&ray.samples, |sample| sample.distance);
             let composited = composite_with(
@@ -172,19 +173,19 @@ impl Model {
         batch
     }
 
-    fn evaluate(&self, position: DVec3, direction: DVec3) -> Evaluation {
+    fn evaluate(&self, position: DVec3, direction: DVec3) -> FieldValues {
         let encoded = grid_encode(&self.levels, &self.table, position);
         let density = self.density.forward(&encoded);
         let color_input = [last(&density), &harmonics(direction)].concat();
         let color = self.color.forward(&color_input);
-        Evaluation { density, color }
+        FieldValues { density, color }
     }
 
     /// Adds one sample's part of the gradients.
     fn backward(
         &self,
         position: DVec3,
-        evaluation: &Evaluation,
+        evaluation: &FieldValues,
         d_raw_log_density: f64,
         d_raw_color: [f64; 3],
         gradients: &mut Gradients,

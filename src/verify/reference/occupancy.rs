@@ -60,7 +60,7 @@ impl OccupancyShape {
 }
 
 /// New value of a visited cell, an optical depth: `max(old, exp(min(raw, 15)) δ_min)`; an unseen cell stays. Visits are
-/// those of an update and of every marched sample of a training.
+/// those of an update and of every marched sample of a training run.
 ///
 /// `raw` is the network's log-density somewhere in the cell. `delta_min` is the shortest step in units of the
 /// inner cube's side, `dt_min 2^(C−1)`.

@@ -32,8 +32,9 @@
 //!
 //! Of a ray whose gains are all 1, `R' = R''`, and this is [`super::composite`].
 
+use super::composite;
 use super::composite::{CompositeInput, opacity, optical_depth, optical_depths, transmittances};
-use super::{Transmittance, composite};
+use crate::config::Transmittance;
 
 /// When a sample is worth keeping.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,7 +162,7 @@ impl Walk {
 
 /// One estimate of a ray.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
+pub struct EstimatedRay {
     /// `R'`: colour over the background, and opacity.
     pub rendered: [f64; 4],
     /// `ω'` of every sample, 0 where it is left out.
@@ -172,7 +173,7 @@ pub struct Estimate {
 
 /// Composites a ray of whose samples those with a gain other than 0 are kept; the others only absorb. With a gain of 1
 /// everywhere it is the whole ray, and only that is known in the inclusive convention.
-pub fn thin(convention: Transmittance, ray: &CompositeInput, gains: &[f64]) -> Estimate {
+pub fn thin(convention: Transmittance, ray: &CompositeInput, gains: &[f64]) -> EstimatedRay {
     let depths = optical_depths(ray);
     let transmittance_end = (-depths.iter().sum::<f64>()).exp();
     let weights: Vec<f64> = (transmittances(convention, &depths).iter().zip(&depths))
@@ -187,7 +188,7 @@ pub fn thin(convention: Transmittance, ray: &CompositeInput, gains: &[f64]) -> E
     };
     let rendered = std::array::from_fn(channel);
     if gains.iter().all(|&gain| gain == 1.0) {
-        return Estimate { rendered, weights, by_s: composite::d_rendered_by_s(convention, ray) };
+        return EstimatedRay { rendered, weights, by_s: composite::d_rendered_by_s(convention, ray) };
     }
     let mut by_s = vec![[0.0; 4]; weights.len()];
     for (place, &k) in kept.iter().enumerate() {
@@ -197,7 +198,7 @@ pub fn thin(convention: Transmittance, ray: &CompositeInput, gains: &[f64]) -> E
             gains[k] * depths[k] * (behind + transmittance_end * (own - background[x]))
         });
     }
-    Estimate { rendered, weights, by_s }
+    EstimatedRay { rendered, weights, by_s }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::model::{BatchOutput, Model, Objective, TrainingRay};
 
 /// A model in training.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Training {
+pub struct ModelTraining {
     /// The parameters.
     pub model: Model,
     /// What is minimised.
@@ -25,7 +25,7 @@ pub struct Training {
     pub steps: u32,
 }
 
-impl Training {
+impl ModelTraining {
     /// A model before its first step, with [`Adam::table`] and [`Adam::mlp`].
     pub fn new(model: Model, objective: Objective) -> Self {
         Self {

@@ -9,10 +9,10 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::Transmittance;
 use super::composite::{
     CompositeInput, CompositeOutput, composite, d_rendered_by_s, optical_depths, transmittances, with_opacity,
 };
+use crate::config::Transmittance;
 
 /// Smallest scale of an error.
 pub const MIN_SCALE: f64 = 1e-30;

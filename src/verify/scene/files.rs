@@ -1,10 +1,11 @@
 //! Writes a generated dataset: the images of each split, then its `transforms_*.json`.
 
-use super::picture::{Picture, render};
-use super::rig::{ORBIT_FOV_RAD, Split, camera};
-use super::{Generate, Scene, Summary};
+use super::picture::{RenderedImage, render};
+use super::rig::{ORBIT_FOV_RAD, SPLITS, camera, view_count};
+use super::{Scene, SceneOptions, Summary};
 use crate::camera::{Camera, Lens, LensKind};
-use crate::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use crate::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use crate::photo::Split;
 use crate::support::file::write_atomically;
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
@@ -17,17 +18,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// See [`super::generate`].
 pub(super) fn write(
     scene: &Scene,
-    options: &Generate,
+    options: &SceneOptions,
     out: &Path,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Summary> {
     claim(out)?;
-    let views: Vec<View> = Split::ALL
+    let views: Vec<GeneratedView> = SPLITS
         .into_iter()
-        .flat_map(|split| (0..split.views(options)).map(move |index| (split, index)))
-        .map(|(split, index)| View { split, index, camera: camera(scene, options, split, index) })
+        .flat_map(|split| (0..view_count(options, split)).map(move |index| (split, index)))
+        .map(|(split, index)| GeneratedView { split, index, camera: camera(scene, options, split, index) })
         .collect();
-    for split in Split::ALL {
+    for split in SPLITS {
         let folder = out.join(split.name());
         fs::create_dir_all(&folder).with_context(|| format!("creating {}", folder.display()))?;
     }
@@ -38,12 +39,12 @@ pub(super) fn write(
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         anyhow::Ok(())
     })?;
-    for split in Split::ALL {
+    for split in SPLITS {
         let frames = views.iter().filter(|view| view.split == split);
         let listing = listing(scene, options, frames);
         write_json(&out.join(format!("transforms_{}.json", split.name())), &listing)?;
     }
-    let files = 2 * views.len() + Split::ALL.len();
+    let files = 2 * views.len() + SPLITS.len();
     Ok(Summary { scene: scene.info().name, views: views.len(), files })
 }
 
@@ -60,13 +61,13 @@ fn claim(out: &Path) -> Result<()> {
 }
 
 /// One picture of the dataset.
-struct View {
+struct GeneratedView {
     split: Split,
     index: usize,
     camera: Camera,
 }
 
-impl View {
+impl GeneratedView {
     /// The path of its files within the dataset, without extension.
     fn stem(&self) -> String {
         format!("{}/{:04}", self.split.name(), self.index)
@@ -76,7 +77,7 @@ impl View {
         format!("{}_depth.exr", self.stem())
     }
 
-    fn write(&self, picture: &Picture, hdr: bool, out: &Path) -> Result<()> {
+    fn write(&self, picture: &RenderedImage, hdr: bool, out: &Path) -> Result<()> {
         let (width, height) = (self.camera.width, self.camera.height);
         let color = &picture.linear[..];
         let depth = ExrPixels { color, depth: Some(&picture.depth) };
@@ -107,7 +108,11 @@ impl View {
 
 /// The contents of a `transforms_*.json`: in Blender's dialect (`camera_angle_x`, 8-bit images named without
 /// extension) for scenes with alpha seen by pinholes, else with full intrinsics, of every frame where they differ.
-fn listing<'a>(scene: &Scene, options: &Generate, views: impl Iterator<Item = &'a View>) -> Value {
+fn listing<'a>(
+    scene: &Scene,
+    options: &SceneOptions,
+    views: impl Iterator<Item = &'a GeneratedView>,
+) -> Value {
     let is_blender = !scene.is_opaque() && options.lenses.iter().all(|&kind| kind == LensKind::Pinhole);
     let extension = match (options.hdr, is_blender) {
         (true, _) => ".exr",

@@ -6,7 +6,7 @@ use glam::{DVec2, dvec2};
 use rayon::prelude::*;
 
 /// A rendered view: row-major, one entry per pixel.
-pub(super) struct Picture {
+pub(super) struct RenderedImage {
     /// Premultiplied linear colour and alpha.
     pub linear: Vec<[f32; 4]>,
     /// Straight sRGB colour and alpha, rounded to 8 bits; averaged premultiplied in encoded values.
@@ -16,7 +16,7 @@ pub(super) struct Picture {
 }
 
 /// Renders `camera`'s view with `samples * samples` sub-rays per pixel.
-pub(super) fn render(scene: &Scene, camera: &Camera, samples: u32) -> Picture {
+pub(super) fn render(scene: &Scene, camera: &Camera, samples: u32) -> RenderedImage {
     let (width, height) = (camera.width as usize, camera.height as usize);
     let pattern = pattern(samples);
     let pixels: Vec<Pixel> = (0..width * height)
@@ -27,7 +27,7 @@ pub(super) fn render(scene: &Scene, camera: &Camera, samples: u32) -> Picture {
             pixel(scene, camera, corner, &pattern)
         })
         .collect();
-    Picture {
+    RenderedImage {
         linear: pixels.iter().map(Pixel::linear).collect(),
         srgb: pixels.iter().map(Pixel::srgb8).collect(),
         depth: pixels.iter().map(Pixel::depth).collect(),

@@ -1,7 +1,8 @@
 //! Where the cameras of a generated dataset stand and what their lenses are.
 
-use super::{Generate, Scene};
+use super::{Scene, SceneOptions};
 use crate::camera::{Camera, Lens, LensKind};
+use crate::photo::Split;
 use glam::{DAffine3, DMat3, DVec2, DVec3, dvec2, dvec3};
 use std::f64::consts::TAU;
 
@@ -11,44 +12,27 @@ pub(super) const ORBIT_FOV_RAD: f64 = 40.0 * TAU / 360.0;
 /// Distance of the cameras of the bounded scenes from the origin.
 const ORBIT_RADIUS: f64 = 4.0;
 
-/// The dataset's splits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Split {
-    Train,
-    Val,
-    Test,
-}
+/// The splits of a generated dataset.
+pub(super) const SPLITS: [Split; 3] = [Split::Train, Split::Val, Split::Test];
 
-impl Split {
-    pub(super) const ALL: [Self; 3] = [Self::Train, Self::Val, Self::Test];
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Train => "train",
-            Self::Val => "val",
-            Self::Test => "test",
-        }
-    }
-
-    /// How many views `options` want of it.
-    pub(super) fn views(self, options: &Generate) -> usize {
-        match self {
-            Self::Train => options.views.train,
-            Self::Val => options.views.val,
-            Self::Test => options.views.test,
-        }
+/// How many views `options` want of a split.
+pub(super) fn view_count(options: &SceneOptions, split: Split) -> usize {
+    match split {
+        Split::Train => options.views.train,
+        Split::Val => options.views.val,
+        Split::Test => options.views.test,
     }
 }
 
 /// The camera of view `index` of a split.
-pub(super) fn camera(scene: &Scene, options: &Generate, split: Split, index: usize) -> Camera {
-    let mut random = Random::new(options.seed, split);
+pub(super) fn camera(scene: &Scene, options: &SceneOptions, split: Split, index: usize) -> Camera {
+    let mut random = SplitMix64::new(options.seed, split);
     let kind = options.lenses[index % options.lenses.len()];
     let (width, height) = options.size;
     let size = dvec2(f64::from(width), f64::from(height));
     let is_capture = scene.is_opaque();
     let world_from_camera = match is_capture {
-        true => handheld(&mut random, index, split.views(options)),
+        true => handheld(&mut random, index, view_count(options, split)),
         false => orbit(&mut random, index, orbit_radius(kind)),
     };
     // A capture's sensor is a little off, but a sphere is always whole.
@@ -101,7 +85,7 @@ fn lens(kind: LensKind) -> Lens {
 
 /// Evenly spread over the sphere without its poles, looking at the origin: the R2 sequence from a random start,
 /// so that any run of consecutive views is spread too.
-fn orbit(random: &mut Random, index: usize, radius: f64) -> DAffine3 {
+fn orbit(random: &mut SplitMix64, index: usize, radius: f64) -> DAffine3 {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     let step = index as f64;
     let angle = TAU * (random.unit() + step / PLASTIC).fract();
@@ -112,7 +96,7 @@ fn orbit(random: &mut Random, index: usize, radius: f64) -> DAffine3 {
 }
 
 /// A walk around the middle with a swaying hand: distance, height, aim and roll vary.
-fn handheld(random: &mut Random, index: usize, count: usize) -> DAffine3 {
+fn handheld(random: &mut SplitMix64, index: usize, count: usize) -> DAffine3 {
     let start = random.unit();
     random.skip(index);
     let mut sway = |size: f64| size * (2.0 * random.unit() - 1.0);
@@ -135,11 +119,11 @@ fn look_at(eye: DVec3, target: DVec3, roll_rad: f64) -> DAffine3 {
 }
 
 /// The SplitMix64 generator, one stream per seed and split.
-struct Random {
+struct SplitMix64 {
     state: u64,
 }
 
-impl Random {
+impl SplitMix64 {
     const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
     fn new(seed: u64, split: Split) -> Self {
@@ -169,13 +153,14 @@ impl Random {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Views;
+    use super::super::ViewCounts;
     use super::*;
 
     fn cameras(scene: &str, split: Split) -> Vec<Camera> {
-        let options = Generate { views: Views { train: 40, val: 5, test: 9 }, ..Generate::new(scene) };
+        let options =
+            SceneOptions { views: ViewCounts { train: 40, val: 5, test: 9 }, ..SceneOptions::new(scene) };
         let scene = Scene::named(scene).expect("a known scene");
-        (0..split.views(&options)).map(|i| camera(&scene, &options, split, i)).collect()
+        (0..view_count(&options, split)).map(|i| camera(&scene, &options, split, i)).collect()
     }
 
     #[test]
@@ -204,14 +189,14 @@ mod tests {
     #[test]
     fn splits_and_seeds_differ() {
         for scene in ["toys", "courtyard"] {
-            let [train, val, test] = Split::ALL.map(|split| cameras(scene, split));
+            let [train, val, test] = SPLITS.map(|split| cameras(scene, split));
             for camera in val.iter().chain(&test) {
                 let eye = camera.world_from_camera.translation;
                 let apart = |other: &Camera| other.world_from_camera.translation.distance(eye) > 1e-3;
                 assert!(train.iter().all(apart));
             }
         }
-        let eye = |seed| orbit(&mut Random::new(seed, Split::Train), 0, ORBIT_RADIUS).translation;
+        let eye = |seed| orbit(&mut SplitMix64::new(seed, Split::Train), 0, ORBIT_RADIUS).translation;
         assert!(eye(0).distance(eye(1)) > 1e-3);
     }
 }

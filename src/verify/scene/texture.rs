@@ -1,6 +1,6 @@
 //! Closed-form textures: a surface point in, a linear colour out.
 
-use crate::photo::color::linear_from_srgb;
+use crate::photo::color_space::linear_from_srgb;
 use glam::{DVec2, DVec3};
 
 /// How far below the surface textures are read, so that faces lying on a cell border have one colour.

@@ -52,13 +52,13 @@ pub(super) struct Light {
 /// Solids and their light.
 #[derive(Clone, Debug)]
 pub(super) struct World {
-    groups: Vec<Group>,
+    groups: Vec<Cluster>,
     light: Light,
 }
 
 /// Solids that lie close together.
 #[derive(Clone, Debug)]
-struct Group {
+struct Cluster {
     objects: Vec<Object>,
     bounds: Ball,
 }
@@ -136,7 +136,7 @@ impl Object {
     }
 }
 
-impl Group {
+impl Cluster {
     fn new(objects: Vec<Object>) -> Self {
         let count = objects.len().max(1) as f64;
         let center = objects.iter().map(|object| object.bounds.center).sum::<DVec3>() / count;
@@ -149,7 +149,7 @@ impl Group {
 impl World {
     /// A world of groups of objects; grouping only saves time.
     pub(super) fn new(groups: Vec<Vec<Object>>, light: Light) -> Self {
-        Self { groups: groups.into_iter().map(Group::new).collect(), light }
+        Self { groups: groups.into_iter().map(Cluster::new).collect(), light }
     }
 
     /// What a ray sees; `direction` has unit length.

@@ -2,7 +2,7 @@
 
 use super::studies::quadrature::medium::{Medium, Rms, Samples, phase};
 use super::studies::quadrature::order::{Point, order};
-use nerf::verify::reference::Transmittance;
+use nerf::config::Transmittance;
 
 const FINE: usize = 200_000;
 

@@ -2,7 +2,7 @@
 
 use super::studies::equations::stiff::golden;
 use super::studies::equations::textbook::{Precision, textbook_d_s};
-use nerf::verify::reference::Transmittance;
+use nerf::config::Transmittance;
 use nerf::verify::reference::composite::composite;
 use nerf::verify::reference::vectors::RayError;
 

@@ -1,4 +1,4 @@
-//! Damaged files and masks: all of them are told, and what a training would refuse is an error.
+//! Damaged files and masks: all of them are told, and what training would refuse is an error.
 
 use super::toys::{Toys, info};
 use serde_json::json;

@@ -61,7 +61,7 @@ fn a_training_leaves_a_page_and_report_writes_it_again() {
     let same = take(&page);
     let scores = |html: &str| html[html.find("<table class=\"scores\"").expect("scores")..].to_owned();
     let scores = |html: &str| scores(html).split("</table>").next().map(str::to_owned);
-    assert_eq!(scores(&same), scores(&html), "from the checkpoint as from the training");
+    assert_eq!(scores(&same), scores(&html), "from the checkpoint as from the run");
 
     fs::rename(here.join("toys"), here.join("moved")).expect("movable");
     let moved = succeeds(here, &["report", "run", "--out", "elsewhere.html"]);
@@ -93,7 +93,7 @@ fn odd_folders(here: &Path, page: &Path) {
     assert!(fails(here, &["report", "missing"]).contains("expected the folder"));
 }
 
-/// The rows of a training's log that tell of test views.
+/// The rows of a run's log that tell of test views.
 fn measurements(run: &Path) -> Vec<Value> {
     let log = fs::read_to_string(run.join("log.jsonl")).expect("a log");
     let rows = log.lines().map(|line| serde_json::from_str::<Value>(line).expect("a row"));

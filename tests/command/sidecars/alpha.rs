@@ -27,7 +27,7 @@ fn premultiplied_photos_train_like_straight_ones() {
     let (straight, plain) = &*PLAIN;
     let premultiplied = place("premultiplied_run");
     let psnr = number(&train(&PREMULTIPLIED, &premultiplied, &STEPS)["psnr"]);
-    let reading = |run| checkpoint(run).about.reading.alpha;
+    let reading = |run| checkpoint(run).metadata.reading.alpha;
     assert_eq!((reading(straight), reading(&premultiplied)), (AlphaMode::Straight, AlphaMode::Premultiplied));
     println!("{plain:.2} dB straight, {psnr:.2} dB premultiplied");
     assert!((psnr - plain).abs() < 0.5, "{plain} {psnr}");
@@ -47,7 +47,7 @@ fn the_reading_of_alpha_can_be_forced() {
     assert!(!is_said && are_equal(&found, &asked), "what is asked for is no guess");
     let (straight, is_said) = run("as_straight", &["--alpha", "straight"]);
     assert!(!is_said && !are_equal(&found, &straight), "other colours, another field");
-    assert_eq!(checkpoint(&straight).about.reading.alpha, AlphaMode::Straight);
+    assert_eq!(checkpoint(&straight).metadata.reading.alpha, AlphaMode::Straight);
 }
 
 #[test]

@@ -35,7 +35,7 @@ fn sixteen_bits_train_like_eight() {
         let left_out = rows(run)[0]["left_out"].to_string();
         assert_eq!(left_out.contains("16-bit pixels"), !deep, "{left_out}");
         assert_eq!(left_out.contains("8-bit pixels (not"), deep, "{left_out}");
-        assert_eq!(checkpoint(run).about.needs.deep, deep);
+        assert_eq!(checkpoint(run).metadata.features.deep, deep);
     };
     let (plain, eight) = &*PLAIN;
     left_out(plain, false);
@@ -143,13 +143,13 @@ fn linear_light_is_learnt_from_dark_to_bright() {
     for (name, dataset) in [("open_exr", &*BRIGHTENED), ("radiance", &radiance)] {
         let run = place(&format!("{name}_run"));
         train(dataset, &run, &["--no-eval", "--steps", "600"]);
-        let about = checkpoint(&run).about;
-        assert!(about.needs.hdr && about.needs.alpha == (name == "open_exr"));
+        let metadata = checkpoint(&run).metadata;
+        assert!(metadata.features.hdr && metadata.features.alpha == (name == "open_exr"));
         let errors = errors(&run, dataset, &BRIGHTENED, 1.0);
         // A field that ends at white renders nothing brighter; one that learns squared errors, no shades. Without
         // alpha, what is black behind the toys makes their shades harder to learn.
         let [rendered_bright, bright, dark] =
-            if about.needs.alpha { [0.7, 0.35, 0.6] } else { [0.3, 0.7, 2.0] };
+            if metadata.features.alpha { [0.7, 0.35, 0.6] } else { [0.3, 0.7, 2.0] };
         assert!(errors.rendered_bright > f64::from(rendered_bright), "{errors:?}");
         assert!(errors.bright < bright && errors.dark < dark, "{errors:?}");
     }

@@ -11,7 +11,7 @@ fn photos_are_measured_as_they_were_trained_on() {
     let run = place("small_run");
     train(&TOYS, &run, &["--steps", "40", "--no-eval", "--downscale", "2", "--crop", "4"]);
     let small = SIZE / 2 - 4;
-    assert_eq!(checkpoint(&run).about.image_size, [small; 2]);
+    assert_eq!(checkpoint(&run).metadata.image_size, [small; 2]);
     let measured = |further: &[&str]| {
         let out = place("small_views");
         let args = ["eval", text(&run), text(&TOYS), "--save", text(&out)];
@@ -24,8 +24,8 @@ fn photos_are_measured_as_they_were_trained_on() {
 
     // As small as before, or it would be refused.
     train(&TOYS, &run, &["--resume", "--steps", "200", "--no-eval"]);
-    let about = checkpoint(&run).about;
-    assert_eq!((about.step, about.image_size, about.reading.downscale), (200, [small; 2], 2));
+    let metadata = checkpoint(&run).metadata;
+    assert_eq!((metadata.step, metadata.image_size, metadata.reading.downscale), (200, [small; 2], 2));
     let (size, after) = measured(&[]);
     assert!(size == [small; 2] && after > before + 1.0, "{before} {after}");
     let other = ["train", text(&TOYS), "--out", text(&run), "--resume", "--downscale", "1"];

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 use image::{ImageBuffer, ImageFormat, Rgba};
-use nerf::capture::image::{ExrPixels, Precision, write_exr, write_png_rgba8};
+use nerf::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::photo::Pixels;
 use nerf::photo::{AlphaMode, Reading};
 

@@ -2,7 +2,7 @@
 
 use image::{DynamicImage, ImageBuffer, Luma};
 use nerf::capture::dataset::Dataset;
-use nerf::capture::image::{ExrPixels, Precision, write_exr};
+use nerf::capture::image_file::{ExrPixels, Precision, write_exr};
 use nerf::photo::Reading;
 
 use super::{Folder, HEIGHT, WIDTH, has_note};

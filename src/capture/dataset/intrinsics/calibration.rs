@@ -4,7 +4,8 @@ use anyhow::{Result, bail, ensure};
 use glam::DVec2;
 
 use crate::capture::dataset::json::{Fields, REMEDY};
-use crate::capture::dataset::notes::{Notes, Severity};
+use crate::capture::dataset::notes::Notes;
+use crate::capture::diagnostics::Severity;
 
 const KEYS: [&str; 5] = ["K", "intrinsics", "intrinsic_matrix", "camera_matrix", "camera_intrinsics"];
 

@@ -5,9 +5,10 @@ use std::f64::consts::PI;
 use anyhow::{Result, ensure};
 use glam::DVec2;
 
-use super::extent::Measure;
+use super::image_size::Measure;
 use crate::capture::dataset::json::{Fields, REMEDY};
-use crate::capture::dataset::notes::{Notes, Severity};
+use crate::capture::dataset::notes::Notes;
+use crate::capture::diagnostics::Severity;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Focal {

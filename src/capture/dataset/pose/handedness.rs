@@ -3,9 +3,9 @@
 use anyhow::{Result, ensure};
 use glam::DAffine3;
 
-use crate::capture::dataset::listing::{Entry, Listing};
+use crate::capture::dataset::listing::{FrameEntry, Listing};
 use crate::capture::dataset::notes::Notes;
-use crate::capture::focus::{Axis, FocusKind, find};
+use crate::capture::focus::{FocusKind, OpticalAxis, find};
 use crate::support::format::few;
 
 /// Makes one reading of all poses of a dataset's files. Where nearly all are mirrored, that is how they are meant,
@@ -13,8 +13,8 @@ use crate::support::format::few;
 /// forward in a right-handed one, as game engines have it, whose third axis is turned round. The second is
 /// taken where the third axes meet in front of the cameras. Where few are mirrored, they are left out.
 pub(in crate::capture::dataset) fn settle(listings: &mut [Listing], notes: &mut Notes) -> Result<()> {
-    let all: Vec<&Entry> = listings.iter().flat_map(|listing| &listing.frames).collect();
-    let mirrored: Vec<&&Entry> = all.iter().filter(|entry| is_mirrored(entry)).collect();
+    let all: Vec<&FrameEntry> = listings.iter().flat_map(|listing| &listing.frames).collect();
+    let mirrored: Vec<&&FrameEntry> = all.iter().filter(|entry| is_mirrored(entry)).collect();
     let count = all.len();
     let Some(first) = mirrored.first() else {
         return Ok(());
@@ -50,12 +50,12 @@ pub(in crate::capture::dataset) fn settle(listings: &mut [Listing], notes: &mut 
     Ok(())
 }
 
-fn is_mirrored(entry: &Entry) -> bool {
+fn is_mirrored(entry: &FrameEntry) -> bool {
     entry.world_from_camera.matrix3.determinant() < 0.0
 }
 
 /// Names the few frames that differ from the others, and so are dropped.
-fn leave_out(entries: &[&Entry], mirrored: bool, notes: &mut Notes) {
+fn leave_out(entries: &[&FrameEntry], mirrored: bool, notes: &mut Notes) {
     let odd: Vec<&str> =
         entries.iter().filter(|e| is_mirrored(e) == mirrored).map(|e| e.label.as_str()).collect();
     if odd.is_empty() {
@@ -72,13 +72,13 @@ fn leave_out(entries: &[&Entry], mirrored: bool, notes: &mut Notes) {
 
 /// Whether the third columns of the poses meet in front of the cameras. Two cameras do not tell, nor do those that see
 /// everything around them.
-fn meet_in_front(entries: &[&Entry]) -> bool {
+fn meet_in_front(entries: &[&FrameEntry]) -> bool {
     if entries.len() < 3 || entries.iter().any(|entry| entry.intrinsics.is_whole_sphere()) {
         return false;
     }
-    let pose = |entry: &&Entry| entry.world_from_camera;
-    let axis = |pose: DAffine3| Axis::along(pose.translation, pose.matrix3.z_axis);
-    let axes: Vec<Axis> = entries.iter().map(pose).map(axis).collect();
+    let pose = |entry: &&FrameEntry| entry.world_from_camera;
+    let axis = |pose: DAffine3| OpticalAxis::along(pose.translation, pose.matrix3.z_axis);
+    let axes: Vec<OpticalAxis> = entries.iter().map(pose).map(axis).collect();
     let focus = find(&axes);
     let ahead = axes.iter().filter(|axis| axis.along_and_across(focus.point).0 > 0.0);
     focus.kind == FocusKind::Crossing && 10 * ahead.count() >= 8 * axes.len()
@@ -114,7 +114,7 @@ mod tests {
         format!("{{\"fl_x\": 9, \"frames\": [{}]}}", frames.join(","))
     }
 
-    fn looks_inwards(entry: &Entry) -> bool {
+    fn looks_inwards(entry: &FrameEntry) -> bool {
         let pose = entry.world_from_camera;
         pose.matrix3.z_axis.dot(pose.translation) > 3.0
     }

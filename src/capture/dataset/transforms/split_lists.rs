@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use anyhow::{Result, bail, ensure};
 use serde_json::Value;
 
-use super::Entry;
+use super::FrameEntry;
 use crate::capture::dataset::json::{Fields, REMEDY, describe, shortened};
 use crate::capture::dataset::notes::Notes;
 use crate::photo::Split;
@@ -18,7 +18,7 @@ const KEYS: [(Split, &str); 3] =
 const DEEPEST: usize = 32;
 
 /// Puts the frames that the lists name into their splits.
-pub(super) fn assign(file: Fields, entries: &mut [Entry], notes: &mut Notes) -> Result<()> {
+pub(super) fn assign(file: Fields, entries: &mut [FrameEntry], notes: &mut Notes) -> Result<()> {
     let names = Names::of(entries);
     let (mut listed, mut unknown, mut moved) = (0, Vec::new(), 0);
     for (split, key) in KEYS {
@@ -70,7 +70,7 @@ struct Names {
 }
 
 impl Names {
-    fn of(entries: &[Entry]) -> Self {
+    fn of(entries: &[FrameEntry]) -> Self {
         let mut names = Self { whole: HashMap::new(), last: HashMap::new() };
         for (index, entry) in entries.iter().enumerate() {
             let path = normal(&entry.file_path);

@@ -10,7 +10,7 @@ pub struct Drawing {
     /// Width and height in drawing units, +y down.
     size: DVec2,
     ground: Color,
-    shapes: Vec<Shape>,
+    shapes: Vec<DrawnShape>,
 }
 
 /// A display-referred colour with an opacity.
@@ -37,7 +37,7 @@ pub(super) enum Anchor {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Shape {
+pub(super) struct DrawnShape {
     outline: Outline,
     fill: Option<Color>,
     stroke: Option<Stroke>,
@@ -78,7 +78,7 @@ impl Stroke {
     }
 }
 
-impl Shape {
+impl DrawnShape {
     fn of(outline: Outline) -> Self {
         Self { outline, fill: None, stroke: None }
     }
@@ -153,7 +153,7 @@ impl Drawing {
         Self { size, ground, shapes: Vec::new() }
     }
 
-    pub(super) fn push(&mut self, shape: Shape) {
+    pub(super) fn push(&mut self, shape: DrawnShape) {
         self.shapes.push(shape);
     }
 
@@ -161,7 +161,7 @@ impl Drawing {
     pub(super) fn text(&mut self, at: DVec2, text: &str, size: f64, color: Color, anchor: Anchor) -> f64 {
         let outline = Outline::Text { at, text: text.to_owned(), size, anchor };
         let halo = Stroke::new(self.ground, 0.28 * size);
-        self.push(Shape::of(outline).filled(color).with(halo));
+        self.push(DrawnShape::of(outline).filled(color).with(halo));
         at.x + CHARACTER * size * text.chars().count() as f64
     }
 

@@ -1,13 +1,13 @@
 //! A part of the picture that shows the world from one side.
 
-use super::drawing::{Anchor, Color, Drawing, Shape, Stroke};
+use super::drawing::{Anchor, Color, Drawing, DrawnShape, Stroke};
 use super::{FAINT, INK, TEXT};
 use crate::support::format::length;
 use glam::{DVec2, DVec3, dvec2};
 
 /// How the world is seen: which directions are to the right and up.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Projection {
+pub(super) struct PanelProjection {
     right: DVec3,
     up: DVec3,
 }
@@ -15,7 +15,7 @@ pub(super) struct Projection {
 /// A direction this near to an axis of the world is drawn as that axis.
 const NEARLY_AN_AXIS: f64 = 0.8;
 
-impl Projection {
+impl PanelProjection {
     /// From above and from the side, for a world where `up` points up.
     pub(super) fn above_and_beside(up: DVec3) -> [Self; 2] {
         let axis = DVec3::AXES.into_iter().find(|axis| axis.dot(up).abs() > NEARLY_AN_AXIS);
@@ -54,7 +54,7 @@ impl Projection {
 pub(super) struct Panel {
     pub(super) corner: DVec2,
     pub(super) size: DVec2,
-    pub(super) projection: Projection,
+    pub(super) projection: PanelProjection,
     /// The point of the world in its middle.
     pub(super) center: DVec3,
     /// Drawing units per world unit.
@@ -109,7 +109,7 @@ impl Panel {
         }
         let is_inside = part[0] < part[1];
         if is_inside {
-            drawing.push(Shape::line(part.map(|at| from + at * (to - from))).with(stroke));
+            drawing.push(DrawnShape::line(part.map(|at| from + at * (to - from))).with(stroke));
         }
         is_inside
     }
@@ -120,7 +120,7 @@ impl Panel {
         let along = (tip - self.middle()).normalize_or(DVec2::X);
         let across = along.perp();
         let back = tip - 16.0 * along;
-        drawing.push(Shape::closed(vec![tip, back + 6.0 * across, back - 6.0 * across]).filled(color));
+        drawing.push(DrawnShape::closed(vec![tip, back + 6.0 * across, back - 6.0 * across]).filled(color));
     }
 
     /// A bar of a round length, at the lower left.
@@ -133,7 +133,7 @@ impl Panel {
         let to = from + dvec2(self.scale * round, 0.0);
         let tick = dvec2(0.0, 4.0);
         for line in [[from, to], [from - tick, from + tick], [to - tick, to + tick]] {
-            drawing.push(Shape::line(line).with(Stroke::new(INK, 1.4)));
+            drawing.push(DrawnShape::line(line).with(Stroke::new(INK, 1.4)));
         }
         let unit = if round == 1.0 { "world unit" } else { "world units" };
         let name = format!("{} {unit}", plain(round));

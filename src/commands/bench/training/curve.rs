@@ -1,11 +1,11 @@
-//! One training, measured at times that are evenly spaced on a logarithmic axis.
+//! One run, measured at times that are evenly spaced on a logarithmic axis.
 
+use crate::console::Console;
 use crate::narrator::Narrator;
 use crate::progress::{Progress, duration};
-use crate::remarks::Remarks;
 use anyhow::{Context, Result};
 use nerf::config::schedule::Budget;
-use nerf::run::log::Stage;
+use nerf::run::log::StageTime;
 use nerf::run::{Evaluator, Means, Stepper};
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ const FIRST: f64 = 0.1;
 /// The loss is noted whenever this much more time was trained.
 const BETWEEN_LOSSES: f64 = 1.1;
 
-/// What was measured of one training.
+/// What was measured of one run.
 #[derive(Serialize)]
 pub(super) struct Curve {
     /// Steps taken.
@@ -29,16 +29,16 @@ pub(super) struct Curve {
     pub(super) ssim: f64,
     /// Number of test views.
     pub(super) views: usize,
-    /// Steps whose stages were timed: those of one block in sixteen. They are part of the training, and wait for the
+    /// Steps whose stages were timed: those of one block in sixteen. They are part of the run, and wait for the
     /// device each, which costs a little.
     pub(super) timed_steps: u32,
     /// The time of each stage in those steps; none where the adapter has no timestamps.
-    pub(super) stages: Vec<Stage>,
+    pub(super) stages: Vec<StageTime>,
     /// In the order of time.
     pub(super) points: Vec<Point>,
 }
 
-/// A moment of a training.
+/// A moment of a training run.
 #[derive(Clone, Copy, Serialize)]
 pub(super) struct Point {
     /// Steps taken.
@@ -70,14 +70,14 @@ impl From<Means> for Measured {
 }
 
 /// Trains to the end of the budget. The few views are measured at 0.1, 0.2, 0.5, 1, 2, 5, … seconds, all of them at
-/// the end; the clock of the training stands still meanwhile.
+/// the end; the clock of the run stands still meanwhile.
 pub(super) fn follow(
     mut stepper: Stepper,
     evaluator: &mut Evaluator<'_>,
     test: &[usize],
-    remarks: Remarks,
+    console: Console,
 ) -> Result<Curve> {
-    let progress = Progress::new(remarks, "training");
+    let progress = Progress::new(console, "training");
     let (mut points, mut samples) = (Vec::<Point>::new(), 0);
     let (mut next_mark, mut next_loss) = (FIRST, 0.0);
     let mut loss = None;
@@ -105,7 +105,7 @@ pub(super) fn follow(
     }
     drop(progress);
     let (step, seconds) = (stepper.steps(), stepper.seconds());
-    let scores = evaluator.all(test, &mut Narrator::new(remarks))?.context("there are no test views")?;
+    let scores = evaluator.all(test, &mut Narrator::new(console))?.context("there are no test views")?;
     points.pop_if(|last| last.step == step);
     // The few once more, for the curve, and all of them.
     let few = scores.few.filter(|few| few.views < scores.all.views);

@@ -1,0 +1,266 @@
+//! From listed frames to the files that are there, and to frames with cameras of the right size.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::listing::{FrameEntry, Listing};
+use super::notes::Notes;
+use super::photo_source::PhotoSource;
+use super::sidecars::{Finder, Sidecars};
+use super::{Frame, OpenOptions, Split, frames};
+use crate::capture::diagnostics::Severity;
+use crate::capture::image_file::Turn;
+use crate::capture::image_file::{FORMATS, Header};
+use crate::photo::BitDepth;
+use crate::photo::Reading;
+use crate::support::format::few;
+use crate::support::remedy::{Advised, Remedy};
+
+/// A listed frame and what was found of it.
+pub(super) struct ResolvedFrame {
+    entry: FrameEntry,
+    found: Option<(PathBuf, Header)>,
+    /// Why the image, which is there, is not found.
+    damage: Option<String>,
+}
+
+/// All listed frames that a dataset goes on with.
+pub(super) struct Present {
+    /// Number listed, present or not.
+    pub(super) listed: usize,
+    /// Names of those that are missing.
+    pub(super) missing: Vec<String>,
+    resolved: Vec<ResolvedFrame>,
+    damaged: Vec<String>,
+}
+
+/// A frame as far as splitting goes: the split it is listed in, and its file.
+pub(super) type Membership = (Option<Split>, PathBuf);
+
+/// Frames, with what else came of making them.
+pub(super) struct Built {
+    pub(super) frames: Vec<Frame>,
+    pub(super) members: Vec<Membership>,
+    /// As [`super::Dataset::damaged`].
+    pub(super) damaged: Vec<String>,
+}
+
+/// Looks for the images of one listing, in natural order of their names.
+pub(super) fn locate(
+    mut listing: Listing,
+    split: Option<Split>,
+    root: &Path,
+    allow_damaged: bool,
+    notes: &mut Notes,
+) -> Result<Vec<ResolvedFrame>> {
+    notes.append(listing.notes);
+    if listing.frames.iter().any(|entry| entry.split.is_some()) {
+        listing.frames.retain(|entry| entry.split.is_some());
+    }
+    listing.frames.sort_by(|a, b| frames::natural_order(&a.file_path, &b.file_path));
+    let mut seen = HashSet::new();
+    let mut paths = Vec::new();
+    for mut entry in listing.frames {
+        entry.split = split.or(entry.split);
+        let path = frames::find(root, &entry.file_path, &entry.label, notes);
+        let identity = path.as_deref().map(canonical);
+        if identity.is_some_and(|identity| !seen.insert(identity)) {
+            let message = "the image is listed more than once; the first entry counts";
+            notes.frame(Severity::Warning, &entry.label, message);
+        } else {
+            paths.push((entry, path));
+        }
+    }
+    let inspect = |(entry, path): (FrameEntry, Option<PathBuf>)| {
+        let header = path.as_deref().map(Header::read).transpose();
+        match header.with_context(|| entry.label.clone()) {
+            Ok(header) => Ok(ResolvedFrame { entry, found: path.zip(header), damage: None }),
+            Err(error) if allow_damaged => {
+                Ok(ResolvedFrame { entry, found: None, damage: Some(format!("{error:#}")) })
+            }
+            Err(error) => Err(error),
+        }
+    };
+    paths.into_par_iter().map(inspect).collect()
+}
+
+fn canonical(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+}
+
+impl Present {
+    /// Sets missing and damaged frames aside.
+    pub(super) fn new(
+        resolved: Vec<ResolvedFrame>,
+        root: &Path,
+        options: &OpenOptions,
+        notes: &mut Notes,
+    ) -> Result<Self> {
+        let listed = resolved.len();
+        let names = |holds: fn(&ResolvedFrame) -> bool| -> Vec<String> {
+            resolved.iter().filter(|frame| holds(frame)).map(|frame| frame.entry.file_path.clone()).collect()
+        };
+        let missing = names(|frame| frame.found.is_none());
+        let nowhere = names(|frame| frame.found.is_none() && frame.damage.is_none());
+        let damaged = resolved.iter().filter_map(|frame| frame.damage.clone()).collect();
+        if !nowhere.is_empty() {
+            let message = format!(
+                "{} of {listed} listed images are missing in {}: {}",
+                nowhere.len(),
+                root.display(),
+                few(&nowhere)
+            );
+            if nowhere.len() < listed {
+                notes.warn(format!("{message}; they are skipped"));
+            } else {
+                let remedy = format!("put the images where `file_path` says, as {FORMATS}");
+                ensure!(options.allow_missing, "{message}; {remedy}");
+            }
+        }
+        let is_any_found = missing.len() < listed;
+        let resolved = resolved.into_iter().filter(|frame| frame.found.is_some() || !is_any_found).collect();
+        Ok(Self { listed, missing, resolved, damaged })
+    }
+
+    /// The depth of the finest images; display-referred and linear ones do not mix.
+    pub(super) fn bit_depth(&self, notes: &mut Notes) -> Result<BitDepth> {
+        let found = || self.resolved.iter().filter_map(|frame| frame.found.as_ref());
+        let first = |bits: BitDepth| found().find(|(_, header)| header.bits == bits);
+        let finest = found().map(|(_, header)| header.bits).max().unwrap_or(BitDepth::Eight);
+        let coarsest = found().map(|(_, header)| header.bits).min().unwrap_or(BitDepth::Eight);
+        if let (Some((fine, _)), Some((coarse, _)), true) =
+            (first(finest), first(coarsest), finest > coarsest)
+        {
+            ensure!(
+                finest < BitDepth::Float,
+                "expected all images in a linear format (OpenEXR, Radiance HDR, TIFF with floats) or none, found {} \
+                 beside {}; convert one kind",
+                fine.display(),
+                coarse.display()
+            );
+            notes.note("some images have 8 bits and some 16; all are used with 16");
+        }
+        Ok(finest)
+    }
+
+    /// Frames with cameras at the size of their photos, and what the splits need to know.
+    pub(super) fn build(self, root: &Path, options: &OpenOptions, notes: &mut Notes) -> Result<Built> {
+        let reading = &options.reading;
+        let mut damaged = self.damaged;
+        let mut finder = Finder::new(root);
+        let is_any_found = self.resolved.iter().any(|frame| frame.found.is_some());
+        let mut members = Vec::new();
+        let mut frames = Vec::new();
+        for ResolvedFrame { entry, found, .. } in self.resolved {
+            let frame = match found {
+                Some((path, header)) => {
+                    let mut sidecars = finder.find(&entry, &path, notes);
+                    if options.allow_missing {
+                        let errors = sidecars.drop_damaged_masks();
+                        damaged.extend(errors.iter().map(|error| format!("{}: {error:#}", entry.label)));
+                    }
+                    frame(&entry, (path, header), sidecars, reading, notes)
+                }
+                None => absent(&entry, reading, notes),
+            };
+            let frame = frame.with_context(|| entry.label.clone())?;
+            members.push((entry.split, canonical(&frame.path)));
+            frames.push(frame);
+        }
+        remark_on_masks(&frames, &finder, is_any_found && reading.invert_masks, notes);
+        Ok(Built { frames, members, damaged })
+    }
+}
+
+/// Remarks on frames without masks, where that may not be meant.
+fn remark_on_masks(frames: &[Frame], finder: &Finder, inverts: bool, notes: &mut Notes) {
+    let (all, unmasked) = (frames.len(), frames.iter().filter(|frame| !frame.has_mask).count());
+    if unmasked > 0 && unmasked < all {
+        notes.note(format!("{unmasked} of {all} frames have no mask; all their pixels count"));
+    }
+    if unmasked == all {
+        finder.unmatched_masks().into_iter().for_each(|message| notes.warn(message));
+        if inverts {
+            let found = "masks are to be inverted, but no frame has one; add the masks, or ";
+            notes.advise(Severity::Warning, Advised::new(found, Remedy::LeaveMasks, ""));
+        }
+    }
+}
+
+/// A frame whose image was found.
+fn frame(
+    entry: &FrameEntry,
+    (path, header): (PathBuf, Header),
+    sidecars: Sidecars,
+    reading: &Reading,
+    notes: &mut Notes,
+) -> Result<Frame> {
+    let stored = [header.width, header.height];
+    let turn = turn(entry, &header, notes);
+    let upright = turn.map_or(stored, |turn| turn.size(stored));
+    for mask in &sidecars.masks {
+        let mask = Header::read(&mask.path)?;
+        let size = [mask.width, mask.height];
+        if size != stored && size != upright {
+            let message = "its mask has another size; each pixel takes the nearest of the mask's";
+            notes.frame(Severity::Note, &entry.label, message);
+        }
+    }
+    let (window, size) = reading.part(upright)?;
+    let (camera, remarks) = entry.intrinsics.camera(upright, entry.world_from_camera);
+    for remark in remarks {
+        notes.frame(remark.severity, &entry.label, remark.message);
+    }
+    Ok(Frame {
+        name: entry.file_path.clone(),
+        path,
+        camera: camera.cropped(window.corner, window.size).resized(size[0], size[1]),
+        has_alpha: header.has_alpha || sidecars.alpha.is_some(),
+        has_own_alpha: header.has_alpha,
+        bits: header.bits,
+        has_mask: !sidecars.masks.is_empty(),
+        has_depth: sidecars.depth.is_some(),
+        source: PhotoSource { stored, turn, window, sidecars },
+    })
+}
+
+/// A frame without an image, of the size that the file declares.
+fn absent(entry: &FrameEntry, reading: &Reading, notes: &mut Notes) -> Result<Frame> {
+    let size = entry.declared_size().unwrap_or_else(|| {
+        let message = "neither an image nor `w` and `h` tell the size; 800x800 is assumed";
+        notes.frame(Severity::Warning, &entry.label, message);
+        [800, 800]
+    });
+    let [width, height] = size;
+    let header = Header { width, height, has_alpha: false, bits: BitDepth::Eight, orientation: None };
+    let path = PathBuf::from(&entry.file_path);
+    frame(entry, (path, header), Sidecars::default(), reading, notes)
+}
+
+/// Whether and how an image is turned. Structure from motion takes pixels as they are stored, whatever a
+/// photo's metadata tells viewers to do, so poses belong to the stored pixels, unless the size that the dataset
+/// declares says that they do not.
+fn turn(entry: &FrameEntry, header: &Header, notes: &mut Notes) -> Option<Turn> {
+    let orientation = header.orientation?;
+    let stored = DVec2::new(f64::from(header.width), f64::from(header.height));
+    let fits = |size: DVec2| {
+        let ratio = entry.intrinsics.declared_size? / size;
+        Some((ratio.x / ratio.y - 1.0).abs() < 0.02)
+    };
+    if let Some(turn) = Turn::of(orientation).filter(|_| fits(stored) == Some(false))
+        && fits(DVec2::new(stored.y, stored.x)) == Some(true)
+    {
+        let message = "its metadata asks viewers to turn the image, and `w` and `h` fit only the turned one; it is \
+                       turned";
+        notes.frame(Severity::Note, &entry.label, message);
+        return Some(turn);
+    }
+    let message = "its metadata asks viewers to turn the image; its pixels are used as they are stored, because \
+                   poses belong to those";
+    notes.frame(Severity::Note, &entry.label, message);
+    None
+}

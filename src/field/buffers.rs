@@ -1,0 +1,105 @@
+//! The buffers that a plan needs on the device, listed before anything is allocated.
+
+use super::layout::Level;
+use super::{
+    Capabilities, Field, Plan, Workspace, backward, color, composite, density, march, occupancy, optimize,
+    rays, viewing,
+};
+use crate::gpu::Gpu;
+use crate::gpu::buffer_spec::BufferSpec;
+use crate::gpu::tensor::Element;
+use anyhow::{Result, anyhow};
+
+impl Plan {
+    /// Whether the adapter can train the field of this plan and render its views.
+    ///
+    /// # Errors
+    /// When it cannot: says what it lacks, and what to change.
+    pub fn check(&self, gpu: &Gpu) -> Result<()> {
+        Capabilities::of(gpu).check(self.accumulation, &gpu.info.name)?;
+        let buffers = self
+            .training_buffers(self.cell_count())
+            .into_iter()
+            .chain(self.for_views(&self.features.lenses).viewing_buffers());
+        for spec in buffers {
+            spec.check(gpu).map_err(|error| anyhow!("{error}; use a smaller {}", setting_of(spec.name)))?;
+        }
+        Ok(())
+    }
+
+    /// Everything but the photos that a training run needs, which visits `visible` cells of its occupancy grid.
+    #[must_use]
+    pub fn training_buffers(&self, visible: usize) -> Vec<BufferSpec> {
+        [self.field_buffers(true), self.step_buffers(visible)].concat()
+    }
+
+    /// What the steps of a training run need besides the field and the photos.
+    fn step_buffers(&self, visible: usize) -> Vec<BufferSpec> {
+        [
+            rays::buffers(self),
+            march::buffers(self),
+            density::buffers(self),
+            color::buffers(self),
+            composite::buffers(self),
+            backward::buffers(self),
+            optimize::buffers(self),
+            occupancy::buffers(visible),
+        ]
+        .concat()
+    }
+
+    /// The field: what describes its levels, and all of its arrays or those that rendering reads.
+    pub(super) fn field_buffers(&self, is_whole: bool) -> Vec<BufferSpec> {
+        let levels = BufferSpec::uniform_storage::<Level>("levels", self.layout.levels.len());
+        let arrays = self.arrays().filter(|array| array.rendered || is_whole);
+        [levels].into_iter().chain(arrays.map(|array| array.spec(self))).collect()
+    }
+
+    /// What rendering needs besides the parameters, as the plan of a renderer.
+    #[must_use]
+    pub fn viewing_buffers(&self) -> Vec<BufferSpec> {
+        [march::buffers(self), density::buffers(self), color::buffers(self), viewing::buffers(self)].concat()
+    }
+
+    /// A tensor in the plan's memory.
+    pub(super) fn tensor(&self, name: &'static str, element: Element, count: usize) -> BufferSpec {
+        BufferSpec::tensor(name, element, count, self.memory)
+    }
+
+    /// One tensor of `rows` rows per hidden layer of the colour network.
+    pub(super) fn color_hidden(&self, names: &'static [&'static str], rows: usize) -> Vec<BufferSpec> {
+        let count = rows * self.config.network.width / 4;
+        let layers = self.config.network.color_layers;
+        names.iter().take(layers).map(|name| self.tensor(name, Element::Vec4, count)).collect()
+    }
+}
+
+/// The setting that a buffer's size follows from.
+fn setting_of(name: &str) -> &'static str {
+    match name {
+        "table" | "table_moments" | "d_table" => "table (grid.log2_table)",
+        "occupancy" | "occupancy_bits" | "visible_cells" => "occupancy grid (occupancy.cells)",
+        "mlp" | "mlp_first" | "mlp_second" | "d_weights" | "d_weight_chunks" => {
+            "network (network.width, network.color_layers)"
+        }
+        "ray_lines" | "ray_steps" | "ray_spans" | "kept_spans" | "ray_tails" | "ray_targets"
+        | "ray_results" => "batch (batch.rays)",
+        _ => "batch (batch.samples, and batch.kept with it) or network (network.width)",
+    }
+}
+
+impl Workspace {
+    /// Room for training steps of `field`, which visit the cells `visible` of its occupancy grid; the photos are
+    /// added later.
+    ///
+    /// # Errors
+    /// When the adapter cannot hold it.
+    pub fn for_training(field: &Field, visible: &[u32]) -> Result<Self> {
+        let (gpu, plan) = (field.gpu(), field.plan());
+        let mut workspace = Self::default();
+        workspace.share(&field.arrays);
+        workspace.allocate(gpu, &plan.step_buffers(visible.len()))?;
+        workspace.write(gpu, "visible_cells", visible);
+        Ok(workspace)
+    }
+}

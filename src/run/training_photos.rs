@@ -1,0 +1,95 @@
+//! The training photos on their way from files to the device.
+
+use super::event::{Event, Observer, Warning};
+use super::memory::MemoryUse;
+use crate::camera::Camera;
+use crate::capture::dataset::Dataset;
+use crate::config::Config;
+use crate::field::trainer::Trainer;
+use crate::field::training_views::TrainingViews;
+use crate::field::{Field, Plan, SceneFeatures, Space};
+use crate::gpu::Gpu;
+use anyhow::Result;
+use std::sync::Arc;
+
+/// The photos that a field is trained on: some frames of a dataset.
+#[derive(Clone, Copy, Debug)]
+pub struct TrainingPhotos<'a> {
+    /// Where they are.
+    pub dataset: &'a Dataset,
+    /// Indices of their frames.
+    pub frames: &'a [usize],
+}
+
+impl<'a> TrainingPhotos<'a> {
+    /// The dataset's own training frames.
+    #[must_use]
+    pub fn of(dataset: &'a Dataset) -> Self {
+        Self { dataset, frames: &dataset.train }
+    }
+
+    /// Their cameras, in world space.
+    #[must_use]
+    pub fn cameras(&self) -> Vec<Camera> {
+        self.dataset.cameras(self.frames)
+    }
+
+    /// What training on them takes of the host's memory and of the device's.
+    #[must_use]
+    pub fn memory(&self, plan: &Plan) -> MemoryUse {
+        MemoryUse::of_training(plan, &self.cameras(), self.dataset.stream_bytes(self.frames))
+    }
+
+    /// Decodes them, a few at a time, and puts them on the device. Masks, alpha, depth and bits come along as far as
+    /// the plan has them.
+    ///
+    /// # Errors
+    /// When a file cannot be read, the device cannot hold the photos, or they are not as the plan expects.
+    pub fn load(&self, gpu: &Arc<Gpu>, plan: &Plan, observer: &mut dyn Observer) -> Result<TrainingViews> {
+        let (dataset, frames) = (self.dataset, self.frames);
+        let mut views = TrainingViews::new(gpu, plan, &self.cameras())?;
+        let mut ignored = Vec::new();
+        observer.notice(&Event::Loading { done: 0, all: frames.len() });
+        dataset.stream(frames, plan.features.depth, &mut |position, photo| {
+            if photo.is_ignored() {
+                ignored.push(dataset.frames[frames[position]].name.as_str());
+            }
+            views.add(&photo)?;
+            observer.notice(&Event::Loading { done: position + 1, all: frames.len() });
+            Ok(())
+        })?;
+        if !ignored.is_empty() {
+            let warning = Warning::IgnoredPhotos { names: &ignored, all: frames.len() };
+            observer.notice(&Event::Warning(warning));
+        }
+        Ok(views)
+    }
+}
+
+impl Plan {
+    /// The plan of a training run on the training frames of `dataset`, whose grid is as fine as their pixels unless `config`
+    /// says how fine.
+    ///
+    /// # Errors
+    /// As [`SceneFeatures::of`].
+    pub fn for_dataset(gpu: &Gpu, dataset: &Dataset, config: Config) -> Result<Self> {
+        let config = config.with_finest(dataset);
+        let features = SceneFeatures::of(dataset, &config)?;
+        Ok(Self::new(gpu, config, features, Space::from(&dataset.bounds)))
+    }
+}
+
+impl Trainer {
+    /// A trainer on the training frames of `dataset`: everything that the photos have and `config` uses is linked, and
+    /// all of them are on the device.
+    ///
+    /// # Errors
+    /// When there is no frame to train on, a setting is out of range, a photo cannot be read, or the adapter cannot hold
+    /// the run.
+    pub fn on(gpu: &Arc<Gpu>, dataset: &Dataset, config: Config) -> Result<Self> {
+        config.validate()?;
+        let plan = Plan::for_dataset(gpu, dataset, config)?;
+        let views = TrainingPhotos::of(dataset).load(gpu, &plan, &mut ())?;
+        Self::new(Field::new(gpu, plan)?, views)
+    }
+}
