@@ -18,6 +18,7 @@ pub mod records;
 pub mod renderer;
 mod shared;
 pub mod silhouette;
+mod sizes;
 mod space;
 pub mod stages;
 pub mod state;
@@ -46,7 +47,8 @@ use parameters::Numbers;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A radiance field on a device: how its kernels are linked, where it is, and the arrays that it consists of.
+/// A radiance field on a device: how its kernels are linked, where it is, and the arrays that it consists of. A clone has
+/// the same arrays.
 #[derive(Clone, Debug)]
 pub struct Field {
     gpu: Arc<Gpu>,
@@ -89,12 +91,12 @@ impl Field {
         Ok(field)
     }
 
-    /// What rendering needs of the checkpoint in a file, and what that says about itself.
+    /// What rendering needs of the checkpoint in a file or in the folder of a run, and what that says about itself.
     ///
     /// # Errors
-    /// When the file cannot be used, or the adapter cannot hold the field.
+    /// When there is none, it cannot be used, or the adapter cannot hold the field.
     pub fn load(gpu: &Arc<Gpu>, path: &Path) -> Result<(Self, Metadata)> {
-        let checkpoint = Checkpoint::load(path)?;
+        let checkpoint = Checkpoint::load(&checkpoint::locate(path)?)?;
         Ok((Self::of(gpu, &checkpoint)?, checkpoint.metadata))
     }
 
@@ -134,11 +136,18 @@ impl Field {
     /// # Errors
     /// When it has only those that rendering reads, or the device was lost.
     pub fn arrays(&self) -> Result<Vec<(&'static str, Numbers)>> {
+        self.check_whole()?;
+        self.arrays.arrays(&self.gpu, &self.plan)
+    }
+
+    /// Whether it has what only training reads.
+    fn check_whole(&self) -> Result<()> {
         ensure!(
             self.is_whole,
-            "this field was loaded to be rendered, without what training keeps of it; load it for training"
+            "this field was loaded to be rendered, without what training keeps of it; train a new one, and give its \
+             Trainer::restore the checkpoint's state"
         );
-        self.arrays.arrays(&self.gpu, &self.plan)
+        Ok(())
     }
 
     /// Sets the numbers of its arrays.

@@ -6,3 +6,4 @@ pub mod file;
 pub mod format;
 pub mod metrics;
 pub mod remedy;
+pub mod statistics;

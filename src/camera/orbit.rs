@@ -1,6 +1,7 @@
 //! Views all around a scene, from what the training cameras had in common.
 
 use crate::camera::{Camera, Geometry, Lens};
+use crate::support::statistics::median;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -35,7 +36,7 @@ impl Orbit {
     #[must_use]
     pub fn of(cameras: &[Camera], center: DVec3) -> Self {
         let up = up(cameras);
-        let over = |value: &dyn Fn(&Camera) -> f64| median(cameras.iter().map(value).collect());
+        let over = |value: &dyn Fn(&Camera) -> f64| median(cameras.iter().map(value)).unwrap_or(0.0);
         let elevation = |camera: &Camera| {
             let direction = (camera.position() - center).normalize_or_zero();
             direction.dot(up).clamp(-1.0, 1.0).asin()
@@ -107,12 +108,6 @@ fn up(cameras: &[Camera]) -> DVec3 {
         up = (up - rows / count).try_normalize().unwrap_or(start);
     }
     if up.dot(start) < 0.0 { -up } else { up }
-}
-
-/// The middle value; the upper one of two, and 0 of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

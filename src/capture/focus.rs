@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::camera::{Camera, Geometry};
+use crate::support::statistics;
 
 /// What matters about a camera here, in world space.
 #[derive(Clone, Copy, Debug)]
@@ -174,7 +175,5 @@ fn ahead(axes: &[OpticalAxis], mean: DVec3, heading: DVec3) -> Focus {
 
 /// The middle value, the upper one of two; not a number for none.
 pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    statistics::median(values).unwrap_or(f64::NAN)
 }

@@ -11,10 +11,9 @@ use nerf::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8
 use nerf::field::renderer::{Renderer, View};
 use nerf::photo::color_space::{ColorSpace, depth_srgb8, opaque_srgb8};
 use nerf::run::TrainedField;
-use nerf::support::file::write_atomically;
+use nerf::support::file::write_json;
 use nerf::support::format::count;
 use serde_json::{Map, Value, json};
-use std::io::Write;
 use std::panic::resume_unwind;
 use std::sync::mpsc;
 use std::thread;
@@ -57,10 +56,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
         listing["depth_far"] = json!(depth_range[1]);
     }
     listing["frames"] = Value::Array(frames);
-    write_atomically(&args.out.join("frames.json"), |file| {
-        serde_json::to_writer_pretty(&mut *file, &listing)?;
-        Ok(file.write_all(b"\n")?)
-    })?;
+    write_json(&args.out.join("frames.json"), &listing)?;
     let out = args.out.display().to_string();
     let result = json!({ "out": out, "frames": jobs.len(), "seconds": seconds });
     session.print(&result, &format!("{} in {out}", count(jobs.len(), "frame")))

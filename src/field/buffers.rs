@@ -1,6 +1,7 @@
 //! The buffers that a plan needs on the device, listed before anything is allocated.
 
 use super::layout::Level;
+use super::sizes::SAMPLES;
 use super::{
     Capabilities, Field, Plan, Workspace, backward, color, composite, density, march, occupancy, optimize,
     rays, viewing,
@@ -22,7 +23,8 @@ impl Plan {
             .into_iter()
             .chain(self.for_views(&self.features.lenses).viewing_buffers());
         for spec in buffers {
-            spec.check(gpu).map_err(|error| anyhow!("{error}; use a smaller {}", setting_of(spec.name)))?;
+            let setting = if spec.sized_by.is_empty() { SAMPLES } else { spec.sized_by };
+            spec.check(gpu).map_err(|error| anyhow!("{error}; use a smaller {setting}"))?;
         }
         Ok(())
     }
@@ -71,20 +73,6 @@ impl Plan {
         let count = rows * self.config.network.width / 4;
         let layers = self.config.network.color_layers;
         names.iter().take(layers).map(|name| self.tensor(name, Element::Vec4, count)).collect()
-    }
-}
-
-/// The setting that a buffer's size follows from.
-fn setting_of(name: &str) -> &'static str {
-    match name {
-        "table" | "table_moments" | "d_table" => "table (grid.log2_table)",
-        "occupancy" | "occupancy_bits" | "visible_cells" => "occupancy grid (occupancy.cells)",
-        "mlp" | "mlp_first" | "mlp_second" | "d_weights" | "d_weight_chunks" => {
-            "network (network.width, network.color_layers)"
-        }
-        "ray_lines" | "ray_steps" | "ray_spans" | "kept_spans" | "ray_tails" | "ray_targets"
-        | "ray_results" => "batch (batch.rays)",
-        _ => "batch (batch.samples, and batch.kept with it) or network (network.width)",
     }
 }
 

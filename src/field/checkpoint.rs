@@ -23,8 +23,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The layout of the file that this version writes and reads.
-pub const FORMAT: u64 = 2;
+/// The layout of the file that this version writes; it reads the one before, too.
+pub const FORMAT: u64 = 3;
+/// The oldest layout that is read. It had the number of cascades among the features, where it is the box's now.
+const OLDEST_FORMAT: u64 = 2;
 /// The key of the metadata entry.
 pub const KEY: &str = "nerf";
 /// The file's name in the folder of a training run.
@@ -104,8 +106,13 @@ impl SplitNames {
 }
 
 /// Settings of earlier versions, which rendering does not need and training no longer knows.
-const RETIRED: [(&str, &str); 3] =
-    [("selection", "keep_probability"), ("occupancy", "warm_up"), ("occupancy", "stride")];
+const RETIRED: [(&str, &str); 5] = [
+    ("/config/selection", "keep_probability"),
+    ("/config/occupancy", "warm_up"),
+    ("/config/occupancy", "stride"),
+    ("/needs", "cascades"),
+    ("/needs", "cameras"),
+];
 
 impl Metadata {
     /// How kernels are linked for an adapter.
@@ -123,7 +130,7 @@ impl Metadata {
     fn parse(text: &str) -> Result<Self> {
         let mut value: Value = serde_json::from_str(text).context("its description is not JSON")?;
         match value["format"].as_u64() {
-            Some(FORMAT) => {}
+            Some(OLDEST_FORMAT..=FORMAT) => value["format"] = FORMAT.into(),
             Some(other) => {
                 bail!(
                     "expected format {FORMAT}, found {other}: another version of nerf wrote it; render it \
@@ -133,7 +140,7 @@ impl Metadata {
             None => bail!("its description has no format number"),
         }
         for (group, key) in RETIRED {
-            if let Some(settings) = value["config"][group].as_object_mut() {
+            if let Some(settings) = value.pointer_mut(group).and_then(Value::as_object_mut) {
                 settings.remove(key);
             }
         }
@@ -339,12 +346,16 @@ mod tests {
         let metadata = checkpoint().metadata;
         let mut value = serde_json::to_value(&metadata).expect("JSON");
         assert!(value["needs"].is_object(), "the key of the scene's features in every file so far");
+        value["format"] = OLDEST_FORMAT.into();
         for (group, key) in RETIRED {
-            value["config"][group][key] = 0.5.into();
+            value.pointer_mut(group).expect("a group")[key] = 1.into();
         }
         assert_eq!(Metadata::parse(&value.to_string()).expect("known"), metadata);
-        value["config"]["occupancy"]["unheard_of"] = 1.into();
-        assert!(Metadata::parse(&value.to_string()).is_err());
+        for group in ["/config/occupancy", "/needs"] {
+            let mut unknown = value.clone();
+            unknown.pointer_mut(group).expect("a group")["unheard_of"] = 1.into();
+            assert!(Metadata::parse(&unknown.to_string()).is_err(), "{group}");
+        }
     }
 
     #[test]
@@ -353,7 +364,7 @@ mod tests {
         let text = |metadata: &Metadata| serde_json::to_string(metadata).expect("JSON");
         let metadata = checkpoint().metadata;
         let newer = Metadata { format: FORMAT + 1, ..metadata.clone() };
-        assert!(format!("{:#}", Metadata::parse(&text(&newer)).expect_err("newer")).contains("found 3"));
+        assert!(format!("{:#}", Metadata::parse(&text(&newer)).expect_err("newer")).contains("found 4"));
         let bytes = std::fs::read(&path).expect("readable");
         let (from, to) = (r#"\"log2_table\":8"#, r#"\"log2_table\":9"#);
         let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect("there");

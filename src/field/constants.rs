@@ -1,6 +1,5 @@
 //! The numbers that kernels know at compile time.
 
-use super::parameters::GROUPS;
 use super::{Plan, dispatch};
 use crate::config::Transmittance;
 use crate::field::layout::DENSITY_OUTPUTS;
@@ -109,7 +108,6 @@ impl Plan {
             ("BETA_1", config.optimizer.beta_1),
             ("BETA_2", config.optimizer.beta_2),
             ("EPSILON", config.optimizer.epsilon),
-            ("L2", self.weight_l2()),
             ("RELATIVE_FLOOR", RELATIVE_FLOOR),
             ("RELATIVE_DARKEST", RELATIVE_DARKEST),
             ("DEPTH_WEIGHT", config.loss.depth),
@@ -120,13 +118,6 @@ impl Plan {
         let source = floats.iter().fold(source, |source, (name, value)| source.float(name, *value));
         let background = config.background.solid().map(|value| value / self.features.grey);
         source.constant("BACKGROUND", vec3(background))
-    }
-
-    /// The L2 regularisation of the networks' weights, which is added to their gradients.
-    fn weight_l2(&self) -> f64 {
-        let learning =
-            GROUPS.iter().filter(|group| group.name == "mlp").find_map(|group| group.learning.as_ref());
-        learning.map_or(0.0, |learning| (learning.l2)(&self.config.optimizer))
     }
 
     /// Inclusive weights are no shares of one whole, so that none can stand for others.

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 
 /// What a scene has, apart from the configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SceneFeatures {
     /// The lenses that cameras have; at least one.
     pub lenses: BTreeSet<LensKind>,

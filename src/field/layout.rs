@@ -4,6 +4,7 @@ use super::Space;
 use crate::camera::Camera;
 use crate::config::{Config, Grid};
 use crate::gpu_struct;
+use crate::support::statistics::median;
 
 /// Features per entry of the hash table.
 pub const FEATURES: usize = 2;
@@ -160,9 +161,7 @@ pub fn finest_resolution(grid: &Grid, space: &Space, cameras: &[Camera]) -> u32 
         return grid.finest;
     }
     let sharpness = |camera: &Camera| camera.pixels_per_length(space.distance_from_center(camera.position()));
-    let mut pixels_per_length: Vec<f64> = cameras.iter().map(sharpness).collect();
-    pixels_per_length.sort_by(f64::total_cmp);
-    let middle = pixels_per_length.get(cameras.len() / 2).copied().unwrap_or(0.0);
+    let middle = median(cameras.iter().map(sharpness)).unwrap_or(0.0);
     let cells = CELLS_PER_PIXEL * space.world_per_box() * middle;
     (cells.min(space.most_grid_cells()) as u32).max(grid.base)
 }

@@ -3,6 +3,7 @@
 
 use super::Plan;
 use super::layout::{FEATURES, Layout};
+use super::sizes::{CELLS, ENTRIES, WEIGHTS};
 use crate::config::Optimizer;
 use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::tensor::Element;
@@ -17,6 +18,8 @@ pub struct ParameterGroup {
     start: InitialValue,
     /// Whether rendering reads it.
     rendered: bool,
+    /// What its size follows from.
+    sized_by: &'static str,
     /// How Adam learns it; `None` for what is measured instead.
     pub learning: Option<Learning>,
 }
@@ -25,7 +28,7 @@ pub struct ParameterGroup {
 pub struct Learning {
     /// Its learning rate, as a multiple of the schedule's.
     pub rate: f64,
-    /// Its L2 regularisation.
+    /// Its L2 regularisation, which the kernel that sums its gradients adds as `L2`.
     pub l2: fn(&Optimizer) -> f64,
     /// The numbers that Adam keeps of it: what they are called, where they are, and how many there are per parameter.
     moments: &'static [(&'static str, ArrayStorage, usize)],
@@ -48,8 +51,13 @@ impl Learning {
 pub enum AdamKernel {
     /// `adam_table.wgsl`: leaves alone what no gradient touched.
     Table,
-    /// `adam_dense.wgsl`: all, from the gradients in the buffer of this name, with two arrays of moments.
-    Dense(&'static str),
+    /// `adam_dense.wgsl`: all, with two arrays of moments.
+    Dense {
+        /// The buffer of the gradients, as large as the group.
+        gradients: &'static str,
+        /// The kernel that sums them and adds the regularisation L2, and raises `gradient_range[1]` to their magnitude.
+        summed_by: &'static str,
+    },
 }
 
 /// Where the numbers of an array are on the device.
@@ -82,6 +90,7 @@ pub static GROUPS: &[ParameterGroup] = &[
         shape: |plan| vec![plan.layout.entries, FEATURES],
         start: InitialValue::Drawn(Layout::initial_table),
         rendered: true,
+        sized_by: ENTRIES,
         learning: Some(Learning {
             rate: 1.0,
             l2: |_| 0.0,
@@ -96,11 +105,12 @@ pub static GROUPS: &[ParameterGroup] = &[
         shape: |plan| vec![plan.layout.quads, 4],
         start: InitialValue::Drawn(Layout::initial_weights),
         rendered: true,
+        sized_by: WEIGHTS,
         learning: Some(Learning {
             rate: 1.0,
             l2: |optimizer| optimizer.l2,
             moments: &[("mlp_first", ArrayStorage::Storage, 1), ("mlp_second", ArrayStorage::Storage, 1)],
-            kernel: AdamKernel::Dense("d_weights"),
+            kernel: AdamKernel::Dense { gradients: "d_weights", summed_by: "weight sums" },
         }),
     },
     ParameterGroup {
@@ -109,6 +119,7 @@ pub static GROUPS: &[ParameterGroup] = &[
         shape: |plan| plan.space.grid_shape(plan.config.occupancy.cells).to_vec(),
         start: InitialValue::Cells(occupancy),
         rendered: false,
+        sized_by: CELLS,
         learning: None,
     },
     ParameterGroup {
@@ -117,6 +128,7 @@ pub static GROUPS: &[ParameterGroup] = &[
         shape: |plan| vec![plan.cell_count() / 32],
         start: InitialValue::Cells(occupancy_bits),
         rendered: true,
+        sized_by: CELLS,
         learning: None,
     },
 ];
@@ -173,6 +185,7 @@ pub struct Array {
     pub rendered: bool,
     place: ArrayStorage,
     start: InitialValue,
+    sized_by: &'static str,
 }
 
 impl Array {
@@ -201,13 +214,14 @@ impl Array {
     /// Its room on the device.
     #[must_use]
     pub fn spec(&self, plan: &Plan) -> BufferSpec {
-        match self.place {
+        let spec = match self.place {
             ArrayStorage::Tensor(element) => {
                 plan.tensor(self.name, element, self.count() * 4 / element.bytes())
             }
             ArrayStorage::Uniform => BufferSpec::uniform_storage::<u32>(self.name, self.count()),
             ArrayStorage::Storage => BufferSpec::storage::<u32>(self.name, self.count()),
-        }
+        };
+        spec.sized_by(self.sized_by)
     }
 }
 
@@ -216,13 +230,13 @@ impl Plan {
     pub fn arrays(&self) -> impl Iterator<Item = Array> {
         GROUPS.iter().flat_map(|group| {
             let shape = (group.shape)(self);
-            let ParameterGroup { name, place, start, rendered, .. } = *group;
-            let own = Array { name, shape: shape.clone(), rendered, place, start };
+            let ParameterGroup { name, place, start, rendered, sized_by, .. } = *group;
+            let own = Array { name, shape: shape.clone(), rendered, place, start, sized_by };
             let moments = group.learning.iter().flat_map(|learning| learning.moments);
             let moments = moments.map(move |&(name, place, per_parameter)| {
                 let mut shape = shape.clone();
                 shape.iter_mut().last().into_iter().for_each(|inner| *inner *= per_parameter);
-                Array { name, shape, rendered: false, place, start: InitialValue::Zeros }
+                Array { name, shape, rendered: false, place, start: InitialValue::Zeros, sized_by }
             });
             [own].into_iter().chain(moments).filter(|array| array.count() > 0)
         })

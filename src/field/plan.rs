@@ -1,5 +1,5 @@
 //! Everything that decides how kernels are linked, and how large their buffers are.
-//!
+
 use super::capacity::Rounds;
 use super::layout::Layout;
 use super::{Capabilities, Capacity, SceneFeatures, Space, layer};
@@ -67,11 +67,7 @@ impl Plan {
             chosen => chosen,
         };
         let shared_weights = adapter.is_cpu && adapter.subgroups_of_8;
-        let rows = match (adapter.is_cpu, shared_weights) {
-            (true, true) => 4,
-            (true, false) => 4,
-            (false, _) => 2,
-        };
+        let rows = if adapter.is_cpu { 4 } else { 2 };
         let chunks = if adapter.is_cpu { 32 } else { 512 };
         let product = layer::Product { rows, shared_weights };
         let rounds = Rounds::suited_to(adapter);

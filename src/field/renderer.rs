@@ -7,7 +7,7 @@ use crate::field::{
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use std::collections::BTreeSet;
 use std::iter::repeat_n;
 use std::ops::Range;
@@ -52,8 +52,12 @@ impl Renderer {
     /// A renderer of a field, for cameras with `lenses`.
     ///
     /// # Errors
-    /// When the adapter cannot hold a round or refuses a kernel.
+    /// Without lenses, or when the adapter cannot hold a round or refuses a kernel.
     pub fn new(field: &Field, lenses: &BTreeSet<LensKind>) -> Result<Self> {
+        ensure!(
+            !lenses.is_empty(),
+            "a renderer needs the lenses of the cameras that it will be given, found none"
+        );
         let (gpu, plan) = (&field.gpu, field.plan.for_views(lenses));
         let mut workspace = Workspace::default();
         workspace.share(&field.arrays);

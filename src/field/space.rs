@@ -19,12 +19,15 @@ pub struct Space {
     center: DVec3,
     /// Half the side of the inner cube, in world units.
     half: f64,
+    /// Half that of the box.
+    outer_half: f64,
     cascades: u32,
 }
 
 impl From<&Bounds> for Space {
     fn from(bounds: &Bounds) -> Self {
-        Self { center: bounds.center, half: bounds.half, cascades: bounds.cascades }
+        let Bounds { center, half, cascades, .. } = *bounds;
+        Self { center, half, outer_half: bounds.outer_half(), cascades }
     }
 }
 
@@ -44,13 +47,13 @@ impl Space {
     /// Sides of the inner cube along that of the box.
     #[must_use]
     pub fn cubes_per_box(&self) -> f64 {
-        f64::from(1u32 << (self.cascades - 1))
+        self.outer_half / self.half
     }
 
     /// World units along the side of the box.
     #[must_use]
     pub fn world_per_box(&self) -> f64 {
-        2.0 * self.half * self.cubes_per_box()
+        2.0 * self.outer_half
     }
 
     /// Sides of the inner cube along a world unit.
@@ -62,7 +65,7 @@ impl Space {
     /// A point of the world, in box space.
     #[must_use]
     pub fn in_box(&self, world: DVec3) -> DVec3 {
-        let corner = self.center - self.half * self.cubes_per_box();
+        let corner = self.center - self.outer_half;
         (world - corner) / self.world_per_box()
     }
 
@@ -117,7 +120,7 @@ impl Space {
 mod tests {
     use super::*;
 
-    const SPACE: Space = Space { center: DVec3::new(1.0, 2.0, 3.0), half: 0.5, cascades: 3 };
+    const SPACE: Space = Space { center: DVec3::new(1.0, 2.0, 3.0), half: 0.5, outer_half: 2.0, cascades: 3 };
 
     #[test]
     fn the_box_is_the_unit_cube() {

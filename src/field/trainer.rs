@@ -58,7 +58,8 @@ impl Trainer {
     /// # Errors
     /// When a photo is missing, or the adapter cannot hold the table or the batch or refuses a kernel.
     pub fn new(mut field: Field, views: TrainingViews) -> Result<Self> {
-        views.check()?;
+        field.check_whole()?;
+        views.check_for(&field.plan)?;
         let (gpu, plan) = (Arc::clone(&field.gpu), field.plan.clone());
         plan.check(&gpu)?;
         let hidden =

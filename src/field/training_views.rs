@@ -100,11 +100,15 @@ impl TrainingViews {
         Ok(())
     }
 
-    /// Whether every camera has its photo, and some pixel can be drawn.
-    pub(crate) fn check(&self) -> Result<()> {
+    /// Whether every camera has its photo, some pixel can be drawn, and the photos are as `plan` reads them.
+    pub(crate) fn check_for(&self, plan: &Plan) -> Result<()> {
         let (photos, cameras) = (self.silhouettes.len(), self.cameras.len());
         ensure!(photos == cameras, "{photos} photos were added for {cameras} cameras");
         ensure!(!self.on_device.is_empty(), nothing_counts(photos));
+        ensure!(
+            self.record == plan.record() && self.space == plan.space,
+            "the photos were loaded for another plan, with other masks, depth, bits or another box; load them again"
+        );
         Ok(())
     }
 }

@@ -15,6 +15,8 @@ pub struct BufferSpec {
     /// Bytes of an element.
     size: usize,
     count: usize,
+    /// What its size follows from, as its user says it; empty where it is always small.
+    pub sized_by: &'static str,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +38,7 @@ impl BufferSpec {
     /// A storage buffer of `count` elements of `T`.
     #[must_use]
     pub fn storage<T>(name: &'static str, count: usize) -> Self {
-        Self { name, kind: Storage::Buffer(BufferUsages::STORAGE), size: size_of::<T>(), count }
+        Self { name, kind: Storage::Buffer(BufferUsages::STORAGE), size: size_of::<T>(), count, sized_by: "" }
     }
 
     /// A buffer that kernels read as uniform and write as storage.
@@ -64,7 +66,13 @@ impl BufferSpec {
     /// A tensor.
     #[must_use]
     pub fn tensor(name: &'static str, element: Element, count: usize, memory: TensorMemory) -> Self {
-        Self { name, kind: Storage::Tensor(element, memory), size: element.bytes(), count }
+        Self { name, kind: Storage::Tensor(element, memory), size: element.bytes(), count, sized_by: "" }
+    }
+
+    /// The same with what its size follows from.
+    #[must_use]
+    pub fn sized_by(self, sized_by: &'static str) -> Self {
+        Self { sized_by, ..self }
     }
 
     /// Bytes on the device, but for the rounding of small buffers.

@@ -4,11 +4,11 @@ use super::log::Log;
 use super::log_writer::LogWriter;
 use crate::config::Config;
 use crate::field::checkpoint::{self, Checkpoint};
-use crate::support::file::write_atomically;
+use crate::support::file::write_json;
 use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Context, Result, bail};
 use std::fs;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The folder of a run.
@@ -134,10 +134,7 @@ impl RunFolder {
                 remove(&self.path.join(name))?;
             }
         }
-        write_atomically(&self.path.join(Self::CONFIG), |file| {
-            serde_json::to_writer_pretty(&mut *file, config)?;
-            Ok(file.write_all(b"\n")?)
-        })?;
+        write_json(&self.path.join(Self::CONFIG), config)?;
         let log = self.path.join(Self::LOG);
         match resumed {
             Some(step) => LogWriter::resume(&log, step),

@@ -35,7 +35,7 @@ impl MemoryUse {
         let buffers = plan.training_buffers(plan.cell_count());
         let fixed: u64 = buffers.iter().map(BufferSpec::bytes).sum();
         // Parameters are drawn on the host first, and read back for checkpoints.
-        let parameters = (plan.layout.entries * 6 + plan.layout.quads * 12) as u64 * 4;
+        let parameters = plan.state_bytes();
         Self {
             host_bytes: BASE_BYTES + stream_bytes + 2 * parameters,
             device_bytes: fixed + photo_bytes + Renderer::bytes(plan),

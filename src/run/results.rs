@@ -30,17 +30,6 @@ pub fn joined(mut first: Value, second: Value) -> Value {
     first
 }
 
-/// An object as an indented file.
-///
-/// # Errors
-/// When the file cannot be written.
-pub fn write_json(path: &Path, value: &Value) -> Result<()> {
-    write_atomically(path, |file| {
-        serde_json::to_writer_pretty(&mut *file, value)?;
-        Ok(file.write_all(b"\n")?)
-    })
-}
-
 /// A text as a file.
 ///
 /// # Errors

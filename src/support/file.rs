@@ -5,6 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, ensure};
+use serde::Serialize;
 
 /// Writes a file through `write` under a temporary name in the same folder, syncs it to disk and renames
 /// it to `path`: readers see the old file or the complete new one.
@@ -25,6 +26,17 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) ->
         Ok(())
     };
     attempt().with_context(|| format!("writing {}", path.display()))
+}
+
+/// Writes an object as an indented JSON file.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    write_atomically(path, |file| {
+        serde_json::to_writer_pretty(&mut *file, value)?;
+        Ok(file.write_all(b"\n")?)
+    })
 }
 
 /// Creates the folder where there is none, and tries whether files can be written to it.

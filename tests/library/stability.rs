@@ -352,3 +352,23 @@ fn batches_too_long_for_ordered_sums() {
         training.survives(4);
     }
 }
+
+/// A field, its photos and its renderer that do not go together are refused with what was found.
+#[test]
+fn parts_that_do_not_fit_are_refused() {
+    let training = Scene::default().train();
+    let (field, gpu) = (training.trainer.field(), &training.gpu);
+    let refusal = |error: anyhow::Error| format!("{error:#}");
+    let renderer = Renderer::new(field, &[].into()).map(drop);
+    assert!(refusal(renderer.expect_err("no lens")).contains("lenses"));
+    let views = |plan: &Plan| {
+        let cameras = Scene::default().cameras();
+        let mut views = TrainingViews::new(gpu, plan, &cameras).expect("room");
+        Scene::default().images().into_iter().for_each(|image| views.add(&image.into()).expect("its photo"));
+        views
+    };
+    let masked = SceneFeatures { masks: true, ..field.plan().features.clone() };
+    let masked = Plan { features: masked, ..field.plan().clone() };
+    let mixed = Trainer::new(Field::new(gpu, masked).expect("a field"), views(field.plan()));
+    assert!(refusal(mixed.map(drop).expect_err("another plan")).contains("another plan"));
+}

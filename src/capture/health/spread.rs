@@ -1,5 +1,6 @@
 //! The spread of some numbers, and how it reads.
 
+use crate::support::statistics::median;
 use serde::Serialize;
 
 /// The least, the middle and the largest of some numbers.
@@ -16,10 +17,10 @@ pub struct Spread {
 impl Spread {
     /// That of `values`; all 0 without any.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
-        let mut values: Vec<f64> = values.into_iter().collect();
-        values.sort_by(f64::total_cmp);
-        let Some((&min, &max)) = values.first().zip(values.last()) else { return Self::default() };
-        Self { min, median: values[values.len() / 2], max }
+        let values: Vec<f64> = values.into_iter().collect();
+        let Some(median) = median(values.iter().copied()) else { return Self::default() };
+        let extreme = |of: fn(f64, f64) -> f64| values.iter().copied().fold(median, of);
+        Self { min: extreme(f64::min), median, max: extreme(f64::max) }
     }
 
     /// As text: one number where all are the same as `say` prints them.

@@ -13,11 +13,9 @@ use nerf::config::schedule::Budget;
 use nerf::field::Field;
 use nerf::field::trainer::Trainer;
 use nerf::gpu::Gpu;
-use nerf::run::results::{
-    circumstances, joined, markdown, optional, quoted, write_csv, write_json, write_text,
-};
+use nerf::run::results::{circumstances, joined, markdown, optional, quoted, write_csv, write_text};
 use nerf::run::{Resolved, StepClock, Stepper, TrainOptions};
-use nerf::support::file::writable_folder;
+use nerf::support::file::{writable_folder, write_json};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;

@@ -5,6 +5,7 @@ use super::density::{layer_stage, quads};
 use super::march::SPARE_ROWS;
 use crate::field::layout::{DENSITY_OUTPUTS, Layer};
 use crate::field::shared::Tile;
+use crate::field::sizes::WEIGHTS;
 use crate::field::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
@@ -25,7 +26,7 @@ pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
         plan.tensor("d_density_out", Element::Vec4, rows * DENSITY_OUTPUTS / 4),
         plan.tensor("d_density_hidden", Element::Vec4, rows * plan.config.network.width / 4),
         plan.tensor("d_encoding", Element::Vec4, rows * plan.layout.encoding() / 4),
-        plan.tensor("d_weight_chunks", Element::Vec4, plan.chunks * plan.layout.quads),
+        plan.tensor("d_weight_chunks", Element::Vec4, plan.chunks * plan.layout.quads).sized_by(WEIGHTS),
     ];
     buffers.extend(plan.color_hidden(&D_COLOR_HIDDEN, rows));
     buffers

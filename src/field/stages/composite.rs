@@ -1,6 +1,7 @@
 //! The fused render, loss and gradient kernel.
 
 use super::march::SPARE_ROWS;
+use crate::field::sizes::RAYS;
 use crate::field::{Capacity, Link, Plan, RayResult, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
@@ -14,8 +15,8 @@ pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let rows = kept + SPARE_ROWS;
     let mut buffers = vec![
         plan.tensor("kept_steps", Element::Vec4, 2 * rows),
-        BufferSpec::storage::<f32>("ray_tails", rays),
-        BufferSpec::storage::<RayResult>("ray_results", rays),
+        BufferSpec::storage::<f32>("ray_tails", rays).sized_by(RAYS),
+        BufferSpec::storage::<RayResult>("ray_results", rays).sized_by(RAYS),
         plan.tensor("d_color", Element::Vec4, rows),
     ];
     if plan.needs_distances() {

@@ -1,5 +1,6 @@
 //! From rays to samples: marching through the occupancy grid, and the scan that packs the samples.
 
+use crate::field::sizes::RAYS;
 use crate::field::{Capacity, Counters, Link, Plan, Step, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
@@ -17,10 +18,10 @@ pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
         BufferSpec::uniform::<Step>("step"),
         BufferSpec::uniform_storage::<Counters>("counters", 1),
         BufferSpec::indirect("dispatch", dispatch::COUNT * 4),
-        BufferSpec::storage::<u32>("ray_steps", rays * plan.step_words()),
-        BufferSpec::storage::<[u32; 2]>("ray_spans", rays),
-        BufferSpec::storage::<[u32; 2]>("kept_spans", rays),
-        plan.tensor("ray_lines", Element::Vec4, 2 * rays),
+        BufferSpec::storage::<u32>("ray_steps", rays * plan.step_words()).sized_by(RAYS),
+        BufferSpec::storage::<[u32; 2]>("ray_spans", rays).sized_by(RAYS),
+        BufferSpec::storage::<[u32; 2]>("kept_spans", rays).sized_by(RAYS),
+        plan.tensor("ray_lines", Element::Vec4, 2 * rays).sized_by(RAYS),
         plan.tensor("samples", Element::Vec4, samples + SPARE_ROWS),
     ]
 }

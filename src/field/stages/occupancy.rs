@@ -1,6 +1,7 @@
 //! Refreshing the occupancy grid from the density network.
 
 use super::density;
+use crate::field::sizes::CELLS;
 use crate::field::{Link, Plan, Workspace};
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
@@ -24,7 +25,7 @@ pub struct Update {
 pub(crate) fn buffers(visible: usize) -> Vec<BufferSpec> {
     vec![
         BufferSpec::storage::<f32>("occupancy_mean", 1),
-        BufferSpec::storage::<u32>("visible_cells", visible.max(1)),
+        BufferSpec::storage::<u32>("visible_cells", visible.max(1)).sized_by(CELLS),
     ]
 }
 

@@ -1,7 +1,8 @@
 //! From gradients to parameters: their range, the scatter into the table, and Adam, group by group.
 
 use crate::config::Accumulation;
-use crate::field::parameters::{AdamKernel, GROUPS, Learning};
+use crate::field::parameters::{AdamKernel, Array, GROUPS, Learning};
+use crate::field::sizes::ENTRIES;
 use crate::field::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
@@ -16,11 +17,25 @@ pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let memory = if ordered { plan.memory } else { TensorMemory::Buffers };
     // Integers of 64 bits take twice the room of floats.
     let words = if plan.accumulation == Accumulation::Fixed { 2 } else { 1 };
-    vec![
-        BufferSpec::tensor("d_table", Element::Vec2, plan.layout.entries * words, memory),
-        BufferSpec::storage::<[f32; 4]>("d_weights", plan.layout.quads),
+    let mut buffers = vec![
+        BufferSpec::tensor("d_table", Element::Vec2, plan.layout.entries * words, memory).sized_by(ENTRIES),
         BufferSpec::storage::<u32>("gradient_range", 3),
-    ]
+    ];
+    for (array, learning) in learnt(plan) {
+        if let AdamKernel::Dense { gradients, .. } = learning.kernel {
+            let spec = BufferSpec::storage::<f32>(gradients, array.count());
+            buffers.push(spec.sized_by(array.spec(plan).sized_by));
+        }
+    }
+    buffers
+}
+
+/// The groups that Adam learns and that have parameters.
+fn learnt(plan: &Plan) -> impl Iterator<Item = (Array, &'static Learning)> {
+    plan.arrays().filter_map(|array| {
+        let group = GROUPS.iter().find(|group| group.name == array.name)?;
+        Some((array, group.learning.as_ref()?))
+    })
 }
 
 /// Finds out whether the gradients can be used, scatters into the table, updates all parameters and ends the
@@ -30,15 +45,16 @@ pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stage>> {
     let bound = |link: &Link| workspace.bind(gpu, &plan.kernel(gpu, link)?, &[]);
-    let mut stages = vec![
-        plan.stage(gpu, workspace, &Link::of("gradient range"), dispatch::KEPT)?,
-        Stage::over(bound(&Link::of("weight sums"))?, plan.layout.quads),
-        scatter(gpu, plan, workspace)?,
-    ];
-    for group in GROUPS {
-        if let Some(learning) = &group.learning {
-            stages.push(adam(gpu, plan, workspace, group.name, learning)?);
+    let mut stages = vec![plan.stage(gpu, workspace, &Link::of("gradient range"), dispatch::KEPT)?];
+    for (array, learning) in learnt(plan) {
+        if let AdamKernel::Dense { summed_by, .. } = learning.kernel {
+            let link = Link::of(summed_by).float("L2", (learning.l2)(&plan.config.optimizer));
+            stages.push(Stage::over(bound(&link)?, array.count() / 4));
         }
+    }
+    stages.push(scatter(gpu, plan, workspace)?);
+    for (array, learning) in learnt(plan) {
+        stages.push(adam(gpu, plan, workspace, &array, learning)?);
     }
     stages.push(Stage::single(bound(&Link::of("finish").with("counted", "written"))?));
     Ok(stages)
@@ -55,22 +71,16 @@ fn scatter(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
 }
 
 /// Adam on a group.
-fn adam(
-    gpu: &Gpu,
-    plan: &Plan,
-    workspace: &Workspace,
-    name: &'static str,
-    learning: &Learning,
-) -> Result<Stage> {
+fn adam(gpu: &Gpu, plan: &Plan, workspace: &Workspace, array: &Array, learning: &Learning) -> Result<Stage> {
+    let (name, count) = (array.name, array.count());
     let label = format!("adam {name}");
     let bind = |link: Link, renamed: &[(&str, &str)]| -> Result<Bound> {
         workspace.bind(gpu, &plan.kernel(gpu, &link.float("RATE", learning.rate))?, renamed)
     };
-    let count = plan.arrays().find(|array| array.name == name).map_or(0, |array| array.count());
     Ok(match learning.kernel {
         // Two entries per thread.
         AdamKernel::Table => Stage::wide(bind(Link::of_file(&label, "adam_table"), &[])?, count / 2 / 2),
-        AdamKernel::Dense(gradients) => {
+        AdamKernel::Dense { gradients, .. } => {
             let [first, second] = learning.moments();
             let renamed = [
                 ("parameters", name),

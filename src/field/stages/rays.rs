@@ -1,5 +1,6 @@
 //! Drawing the rays of a step: pixels of photos, what they show, and what is behind it.
 
+use crate::field::sizes::RAYS;
 use crate::field::{Link, Plan, RayTarget, Workspace, dispatch, records};
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;
@@ -8,7 +9,7 @@ use anyhow::Result;
 
 /// What the rays should show.
 pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
-    vec![BufferSpec::storage::<RayTarget>("ray_targets", plan.capacity.rays)]
+    vec![BufferSpec::storage::<RayTarget>("ray_targets", plan.capacity.rays).sized_by(RAYS)]
 }
 
 /// Draws the rays of a step, from `cameras` cameras.

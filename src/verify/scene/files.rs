@@ -6,12 +6,11 @@ use super::{Scene, SceneOptions, Summary};
 use crate::camera::{Camera, Lens, LensKind};
 use crate::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use crate::photo::Split;
-use crate::support::file::write_atomically;
+use crate::support::file::write_json;
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::fs;
-use std::io::Write;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -163,12 +162,4 @@ fn intrinsics(camera: &Camera) -> Map<String, Value> {
         put(name, json!(value));
     }
     keys
-}
-
-fn write_json(path: &Path, value: &Value) -> Result<()> {
-    write_atomically(path, |file| {
-        serde_json::to_writer_pretty(&mut *file, value)?;
-        file.write_all(b"\n")?;
-        Ok(())
-    })
 }
