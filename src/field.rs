@@ -69,15 +69,13 @@ enum StepExcess {
 }
 
 impl Field {
-    /// A field that no step was taken of, with everything that training needs.
+    /// Room for a field and for everything that training keeps of it, all zeros: a trainer sets it to where training
+    /// begins.
     ///
     /// # Errors
     /// When the adapter cannot hold it.
     pub fn new(gpu: &Arc<Gpu>, plan: Plan) -> Result<Self> {
-        let field = Self::allocate(gpu, plan, true)?;
-        let nothing_hidden = vec![false; field.plan.cell_count()];
-        field.reset(&nothing_hidden)?;
-        Ok(field)
+        Self::allocate(gpu, plan, true)
     }
 
     /// What rendering needs of a checkpoint.
@@ -123,12 +121,6 @@ impl Field {
     #[must_use]
     pub fn gpu(&self) -> &Arc<Gpu> {
         &self.gpu
-    }
-
-    /// Back to where a training run begins for which nothing can be in the `hidden` cells of the occupancy grid.
-    fn reset(&self, hidden: &[bool]) -> Result<()> {
-        let start = self.plan.arrays().map(|array| (array.name, array.start(&self.plan, hidden)));
-        self.set_arrays(&start.collect::<Vec<_>>())
     }
 
     /// The numbers of its arrays.
