@@ -4,7 +4,7 @@ use super::{Link, Plan, Workspace, shared};
 use crate::gpu::Gpu;
 use crate::gpu::kernel::Kernel;
 use crate::gpu::pass::Stage;
-use crate::support::file::write_atomically;
+use crate::support::file::{writable_folder, write_atomically};
 use anyhow::Result;
 use std::io::Write;
 use std::path::Path;
@@ -19,6 +19,7 @@ impl Plan {
         let source = self.source(link)?;
         if let Some(folder) = std::env::var_os("NERF_DUMP_SHADERS") {
             let path = Path::new(&folder).join(format!("{}.wgsl", link.label().replace(' ', "_")));
+            writable_folder(Path::new(&folder))?;
             write_atomically(&path, |file| Ok(file.write_all(source.text().as_bytes())?))?;
         }
         Kernel::new(gpu, &source, shared::LAYOUTS)
