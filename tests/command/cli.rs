@@ -2,6 +2,7 @@
 
 use crate::program::{answer, nerf};
 use crate::support::folder;
+use nerf::field::checkpoint::FORMAT;
 use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
@@ -145,7 +146,8 @@ fn files_that_are_no_checkpoint_are_explained() {
     let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
     bytes.extend(header.as_bytes());
     fs::write(here.path().join("newer"), &bytes).expect("writable");
-    render("newer", &["expected format 2, found 77", "another version"]);
+    let expected = format!("expected format {FORMAT}, found 77");
+    render("newer", &[&expected, "another version"]);
 }
 
 #[test]
