@@ -44,6 +44,7 @@ use crate::gpu::buffer::Buffer;
 use anyhow::{Result, ensure};
 use checkpoint::{Checkpoint, Metadata};
 use parameters::Numbers;
+use state::State;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -96,6 +97,16 @@ impl Field {
     pub fn load(gpu: &Arc<Gpu>, path: &Path) -> Result<(Self, Metadata)> {
         let checkpoint = Checkpoint::load(&checkpoint::locate(path)?)?;
         Ok((Self::of(gpu, &checkpoint)?, checkpoint.metadata))
+    }
+
+    /// Writes it as a checkpoint that says `metadata` of itself.
+    ///
+    /// # Errors
+    /// When it has only what rendering reads, a number is not finite, or the file cannot be written.
+    pub fn save(&self, path: &Path, metadata: Metadata) -> Result<()> {
+        let Metadata { step, rays, step_excess, .. } = metadata;
+        let state = State { step, rays, step_excess, arrays: self.arrays()? };
+        Checkpoint { metadata, state }.save(path)
     }
 
     fn allocate(gpu: &Arc<Gpu>, plan: Plan, is_whole: bool) -> Result<Self> {

@@ -3,6 +3,7 @@
 //! It knows neither files nor progress bars: a step is a list of dispatches, and [`Trainer::report`] says
 //! what happened since the last report.
 
+use crate::field::checkpoint::Metadata;
 use crate::field::layout::pcg;
 use crate::field::state::State;
 use crate::field::training_views::TrainingViews;
@@ -15,6 +16,7 @@ use crate::gpu::Gpu;
 use crate::gpu::pass::Stage;
 use crate::gpu::timer::Timer;
 use anyhow::Result;
+use std::path::Path;
 use std::sync::Arc;
 
 /// The name under which a timer finds the updates of the occupancy grid.
@@ -124,13 +126,23 @@ impl Trainer {
     /// # Errors
     /// When the device was lost.
     pub fn state(&self) -> Result<State> {
+        let (rays, step_excess) = self.sampling()?;
+        Ok(State { step: self.step, rays, step_excess, arrays: self.field.arrays()? })
+    }
+
+    /// Rays of the next step, and by how much its steps along them are longer than the configuration's, as a share of them.
+    fn sampling(&self) -> Result<(u32, f32)> {
         let counters = self.field.gpu.read::<Counters>(self.workspace.get("counters"), 0, 1)?[0];
-        Ok(State {
-            step: self.step,
-            rays: counters.rays,
-            step_excess: counters.step_excess,
-            arrays: self.field.arrays()?,
-        })
+        Ok((counters.rays, counters.step_excess))
+    }
+
+    /// Writes the field and where its training stands to `path`, with what `metadata` says of it otherwise.
+    ///
+    /// # Errors
+    /// When a number is not finite, the file cannot be written, or the device was lost.
+    pub fn save(&self, path: &Path, metadata: Metadata) -> Result<()> {
+        let (rays, step_excess) = self.sampling()?;
+        self.field.save(path, Metadata { step: self.step, rays, step_excess, ..metadata })
     }
 
     /// One step: refresh the occupancy grid when it is due, then rays → march → density → select → colour →

@@ -15,7 +15,7 @@ use super::stepper::{Block, Stepper};
 use crate::capture::dataset::Dataset;
 use crate::config::schedule::Budget;
 use crate::field::Field;
-use crate::field::checkpoint::{Checkpoint, Metadata};
+use crate::field::checkpoint::Metadata;
 use crate::field::trainer::Trainer;
 use crate::gpu::Gpu;
 use crate::support::file::writable_folder;
@@ -226,12 +226,10 @@ impl TrainingSession<'_> {
     }
 
     fn save(&mut self, observer: &mut dyn Observer) -> Result<()> {
-        let state = self.stepper.trainer().state()?;
-        let (step, rays, step_excess) = (state.step, state.rays, state.step_excess);
+        let step = self.stepper.steps();
         let seconds = self.stepper.clock().recorded_seconds();
-        let metadata = Metadata { step, rays, step_excess, seconds, ..self.metadata.clone() };
         let path = self.folder.checkpoint();
-        let saved = Checkpoint { metadata, state }.save(&path);
+        let saved = self.stepper.trainer().save(&path, Metadata { seconds, ..self.metadata.clone() });
         saved.with_context(|| format!("at step {step} ({})", self.kept()))?;
         self.saved = (step, self.stepper.seconds());
         observer.notice(&Event::Saved { step, path: &path });
