@@ -200,6 +200,17 @@ fn bad_photos_are_named() {
     result.expect(0, "warning", &["1 photo shows nothing but black"], &["./train/0010"]);
     result.expect(0, "warning", &["1 photo shows nothing but white"], &["./train/0014"]);
     assert!(info(&toys.path(), &["--no-photos"]).of_severity("warning").is_empty());
+    // However many there are, a black photo is no number of stops away from others.
+    for index in 0..18 {
+        toys.edit_photo(index, |photo| photo.brighten(-400));
+    }
+    let text = nerf().arg("info").arg(toys.path()).output().expect("runs").stdout;
+    let text = String::from_utf8(text).expect("text");
+    let line = text.lines().find(|line| line.contains("decoded")).expect("about photos");
+    assert!(line.contains("stops from the median of those that are not black; 18 are"), "{line}");
+    let stops = line.split("brightness ").nth(1).expect("a brightness").split(' ');
+    let stops: Vec<f64> = stops.filter_map(|word| word.parse().ok()).filter(|&stop| stop != 18.0).collect();
+    assert!(stops.len() == 2 && stops.iter().all(|stop| stop.abs() < 8.0), "{line}");
     let toys = Toys::new();
     toys.edit_photo(8, |photo| {
         let mut dark = photo.to_rgba8();

@@ -87,6 +87,11 @@ impl Look {
             thumbnail: coarse.thumbnail(),
         }
     }
+
+    /// Whether there is something, and all of it is black.
+    fn is_black(&self) -> bool {
+        !self.is_empty && (self.black >= NEARLY_ALL || self.brightness == Some(0.0))
+    }
 }
 
 /// All photos that could be decoded, in the order of the frames.
@@ -103,10 +108,17 @@ impl Gallery {
         Spread::of(self.looks.iter().filter_map(|(_, look)| look.sharpness))
     }
 
-    /// The mean linear brightness of the photos.
+    /// The mean linear brightness of the photos that are not black; how many stops black is below others says nothing.
     #[must_use]
     pub fn brightness(&self) -> Spread {
-        Spread::of(self.looks.iter().filter_map(|(_, look)| look.brightness))
+        let lit = self.looks.iter().filter(|(_, look)| !look.is_black());
+        Spread::of(lit.filter_map(|(_, look)| look.brightness))
+    }
+
+    /// Number of photos that show nothing but black.
+    #[must_use]
+    pub fn black(&self) -> usize {
+        self.looks.iter().filter(|(_, look)| look.is_black()).count()
     }
 
     /// What stands out.
@@ -132,11 +144,7 @@ impl Gallery {
                 "nothing: every pixel is transparent or masked out",
                 "check the alpha channel, or the masks for being inverted",
             ),
-            (
-                |look| !look.is_empty && look.black >= NEARLY_ALL,
-                "nothing but black",
-                "drop those that are not meant to be black",
-            ),
+            (Look::is_black, "nothing but black", "drop those that are not meant to be black"),
             (
                 |look| look.white >= NEARLY_ALL,
                 "nothing but white",
@@ -207,8 +215,7 @@ impl Gallery {
 
     /// Photos much brighter or darker than the others.
     fn uneven(&self, dataset: &Dataset) -> Option<Diagnostic> {
-        let stops =
-            |look: &Look| look.brightness.filter(|b| *b > 0.0 && look.black < NEARLY_ALL).map(f64::log2);
+        let stops = |look: &Look| look.brightness.filter(|_| !look.is_black()).map(f64::log2);
         let all: Vec<f64> = self.looks.iter().filter_map(|(_, look)| stops(look)).collect();
         let middle = Spread::of(all.iter().copied()).median;
         let deviation = 1.4826 * Spread::of(all.iter().map(|stop| (stop - middle).abs())).median;

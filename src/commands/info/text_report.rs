@@ -6,7 +6,7 @@ use nerf::capture::diagnostics::Severity;
 use nerf::capture::health::{Arrangement, Spread, ViewDirections};
 use nerf::photo::BitDepth;
 use nerf::run::Estimate;
-use nerf::support::format::{bytes, count, length, percent, point, short};
+use nerf::support::format::{bytes, count, length, percent, plural, point, short};
 
 /// Width of the headings at the left.
 const MARGIN: usize = 10;
@@ -149,7 +149,7 @@ impl Preflight<'_> {
         let Some(gallery) = &self.gallery else { return Vec::new() };
         let relative = |value: f64, spread: &Spread| value / spread.median.max(f64::MIN_POSITIVE);
         let (sharpness, brightness) = (gallery.sharpness(), gallery.brightness());
-        let stops = |value: f64| format!("{:+.1}", relative(value, &brightness).max(1e-9).log2());
+        let stops = |value: f64| format!("{:+.1}", relative(value, &brightness).log2());
         let mut line = format!("{} decoded", gallery.looks.len());
         if sharpness.max > 0.0 {
             let [least, most] = [sharpness.min, sharpness.max].map(|value| relative(value, &sharpness));
@@ -158,6 +158,14 @@ impl Preflight<'_> {
         if brightness.max > 0.0 {
             let [least, most] = [brightness.min, brightness.max].map(stops);
             line += &format!("; brightness {least} to {most} stops from the median");
+        }
+        match gallery.black() {
+            0 => {}
+            black if black == gallery.looks.len() => line += "; all are black",
+            black => {
+                let are = plural(black as u64, "is", "are");
+                line += &format!(" of those that are not black; {black} {are}");
+            }
         }
         vec![line]
     }
