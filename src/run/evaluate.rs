@@ -38,6 +38,8 @@ pub struct Compared {
     pub rendered: Vec<[f32; 3]>,
     /// The photo, display-referred.
     pub photo: Vec<[f32; 3]>,
+    /// Where masks ignore the photo; empty where they do so nowhere.
+    pub ignored: Vec<bool>,
     /// The rendering's depth, in world units.
     pub depth: Vec<f32>,
     /// Distance from the camera to the scene's focus, else the median depth; in world units.
@@ -74,7 +76,8 @@ impl<'a> Evaluator<'a> {
         let unit = onlookers.map(|around| around.distance(&frame.camera));
         let unit = unit.unwrap_or_else(|| median_depth(&view.depth));
         let size = [view.width, view.height];
-        Ok(Compared { score, size, rendered, photo: target, depth: view.depth, unit })
+        let ignored = photo.ignored.clone();
+        Ok(Compared { score, size, rendered, photo: target, ignored, depth: view.depth, unit })
     }
 
     /// Renders frames one after the other, whose photos are decoded for it, and hands over what it compared, with the

@@ -52,8 +52,14 @@ fn views(count: usize, side: u32) -> TestViews {
         let rendered: Vec<_> = photo.iter().map(off).collect();
         let view = sphere(side);
         let depths = Some(depths_of(&view));
-        let pair =
-            Pair { size: [side, side], rendered: &rendered, photo: &photo, depth: &view.depth, unit: 2.0 };
+        let pair = Pair {
+            size: [side, side],
+            rendered: &rendered,
+            photo: &photo,
+            ignored: &[],
+            depth: &view.depth,
+            unit: 2.0,
+        };
         let name = format!("test/<i>{number}.png");
         let scores = ViewScores { name, psnr: 30.0 - number as f64 / 10.0, ssim: 0.9, depths };
         views.add(number, scores, || Pictures::new(&pair)).expect("drawn");
@@ -283,11 +289,13 @@ fn linear_light_says_how_it_is_shown() {
 #[test]
 fn pictures_of_another_size_are_an_error() {
     let pixels = [[0.5; 3]; 6];
-    let pair = Pair { size: [3, 3], rendered: &pixels, photo: &pixels, depth: &[1.0; 9], unit: 1.0 };
+    let pair =
+        Pair { size: [3, 3], rendered: &pixels, photo: &pixels, ignored: &[], depth: &[1.0; 9], unit: 1.0 };
     let error = Pictures::new(&pair).expect_err("refused").to_string();
     assert!(error.contains("3x3") && error.contains("found 6"), "{error}");
     let pixels = [[0.5; 3]; 9];
-    let pair = Pair { size: [3, 3], rendered: &pixels, photo: &pixels, depth: &[1.0; 8], unit: 1.0 };
+    let pair =
+        Pair { size: [3, 3], rendered: &pixels, photo: &pixels, ignored: &[], depth: &[1.0; 8], unit: 1.0 };
     let error = Pictures::new(&pair).expect_err("refused").to_string();
     assert!(error.contains("found 8"), "{error}");
 }
@@ -306,6 +314,7 @@ fn depth_is_bright_where_it_is_near_and_black_where_nothing_is() {
         size: [5, 1],
         rendered: &pixels,
         photo: &pixels,
+        ignored: &[],
         depth: &[0.0, 1e-6, 1.0, 2.0, 1e9],
         unit: 2.0,
     };
@@ -316,6 +325,34 @@ fn depth_is_bright_where_it_is_near_and_black_where_nothing_is() {
     assert_eq!(colors[3], [0x21, 0x91, 0x8c], "the unit is in the middle");
     let brightness = |color: &[u8; 3]| color.iter().map(|&value| u32::from(value)).sum::<u32>();
     assert!(colors[1..].is_sorted_by_key(|color| std::cmp::Reverse(brightness(color))), "{colors:?}");
+}
+
+#[test]
+fn what_masks_ignore_is_no_error() {
+    let (rendered, photo) = ([[0.5; 3]; 6], [[0.5; 3], [1.0; 3], [1.0; 3], [0.5; 3], [1.0; 3], [0.5; 3]]);
+    let ignored = [false, false, true, true, true, true];
+    let pair = Pair {
+        size: [6, 1],
+        rendered: &rendered,
+        photo: &photo,
+        ignored: &ignored,
+        depth: &[1.0; 6],
+        unit: 1.0,
+    };
+    let mut pictures = Pictures::new(&pair).expect("drawn");
+    let error = decoded(&pictures.error);
+    let colors: Vec<_> = (0..6).map(|x| error[(x, 0)].0).collect();
+    assert_eq!(colors[..2], [[0, 0, 4], [0xfc, 0xff, 0xa4]], "none, and the largest");
+    assert_eq!(colors[2..], [[0x5c; 3], [0x5c; 3], [0x94; 3], [0x94; 3]], "stripes");
+    let page_of = |pictures| {
+        let mut views = TestViews::default();
+        let scores = ViewScores { name: "a".to_owned(), psnr: 20.0, ssim: 0.9, depths: None };
+        views.add(0, scores, || Ok(pictures)).expect("drawn");
+        page(&report(FULL, Ok(views)))
+    };
+    assert!(pictures.has_ignored && page_of(pictures.clone()).contains("striped grey"));
+    pictures.has_ignored = false;
+    assert!(!page_of(pictures).contains("striped grey"));
 }
 
 #[test]

@@ -24,8 +24,8 @@ impl TestViews {
         order.rotate_left(1.min(indices.len()));
         let spread: Vec<usize> = order.iter().map(|&position| indices[position]).collect();
         let reached = evaluator.each(&spread, limit, observer, |number, compared| {
-            let Compared { score, size, rendered, photo, depth, unit } = &compared;
-            let pair = Pair { size: *size, rendered, photo, depth, unit: *unit };
+            let Compared { score, size, rendered, photo, ignored, depth, unit } = &compared;
+            let pair = Pair { size: *size, rendered, photo, ignored, depth, unit: *unit };
             views.add(order[number], score.for_page(), || Pictures::new(&pair))
         })?;
         views.left_out = indices.len() - reached;

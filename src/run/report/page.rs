@@ -195,6 +195,9 @@ fn gallery(views: &TestViews, hdr: bool) -> Markup {
             "Absolute error, mean of red, green and blue, of colours from 0 to 1: "
             span.bar { "0 " i style=(format!("background: {}", gradient(&INFERNO))) {}
                 " " (ERROR_SCALE) " and more" }
+            @if shown.iter().any(|row| row.pictures.as_ref().is_some_and(|pictures| pictures.has_ignored)) {
+                "; striped grey where a mask ignores the photo"
+            }
         }
         (distances::scale(views))
         div.views { @for (number, row) in shown.into_iter().enumerate() { (card(number, row)) } }

@@ -17,6 +17,10 @@ pub const ERROR_SCALE: f32 = 0.1;
 /// Pictures of at most so many pixels are PNG, and exact; others are JPEG.
 const LOSSLESS: u32 = 128 * 128;
 const QUALITY: u8 = 88;
+/// The greys of what masks ignore, in stripes: no colour of an error's scale.
+const IGNORED: [[u8; 3]; 2] = [[0x5c; 3], [0x94; 3]];
+/// The width of those stripes across, in pixels.
+const STRIPE: u32 = 4;
 
 type Picture = ImageBuffer<Rgb<f32>, Vec<f32>>;
 
@@ -29,6 +33,8 @@ pub struct Pair<'a> {
     pub rendered: &'a [[f32; 3]],
     /// The photo.
     pub photo: &'a [[f32; 3]],
+    /// Where masks ignore the photo, so that there is no error; empty where they do so nowhere.
+    pub ignored: &'a [bool],
     /// The rendering's depth in world units, 0 where nothing is.
     pub depth: &'a [f32],
     /// The depth that lies in the middle of the scale, in world units.
@@ -44,8 +50,11 @@ pub struct Pictures {
     pub rendered: String,
     /// The photo.
     pub photo: String,
-    /// The absolute error, mean of the channels, from black for 0 to pale yellow for [`ERROR_SCALE`] and more.
+    /// The absolute error, mean of the channels, from black for 0 to pale yellow for [`ERROR_SCALE`] and more; grey
+    /// stripes where masks ignore the photo.
     pub error: String,
+    /// Whether masks ignore some of the photo.
+    pub has_ignored: bool,
     /// The depth, from yellow for what is near to violet for what is far, linear in `1 / (1 + (depth / unit)³)`; black
     /// where nothing is.
     pub depth: String,
@@ -59,12 +68,13 @@ impl Pictures {
     /// # Errors
     /// When the numbers of pixels do not agree.
     pub fn new(pair: &Pair<'_>) -> Result<Self> {
-        let differ = |(a, b): (&[f32; 3], &[f32; 3])| {
+        // Beside the error, whether it counts: a reduced pixel may cover both what does and what does not.
+        let differ = |(index, (a, b)): (usize, (&[f32; 3], &[f32; 3]))| {
             let sum: f32 = a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum();
-            [sum / 3.0; 3]
+            if pair.ignored.get(index) == Some(&true) { [0.0; 3] } else { [sum / 3.0, 1.0, 0.0] }
         };
-        let errors: Vec<_> = pair.rendered.iter().zip(pair.photo).map(differ).collect();
-        // Beside its place on the scale, whether there is any: a pixel may cover both something and nothing.
+        let errors: Vec<_> = pair.rendered.iter().zip(pair.photo).enumerate().map(differ).collect();
+        // Beside its place on the scale, whether there is any.
         let place = |&z: &f32| match z > 0.0 {
             true => [nearness(f64::from(z) / pair.unit) as f32, 1.0, 0.0],
             false => [0.0; 3],
@@ -75,10 +85,14 @@ impl Pictures {
         let (error, depth) = (reduced(&errors)?, reduced(&depths)?);
         Ok(Self {
             size: [error.width(), error.height()],
-            rendered: encoded(&rendered, |color| color.map(quantised))?,
-            photo: encoded(&photo, |color| color.map(quantised))?,
-            error: encoded(&error, |[error, ..]| color(&INFERNO, error / ERROR_SCALE))?,
-            depth: encoded(&depth, |[place, covered, _]| match covered < 0.5 {
+            rendered: encoded(&rendered, |_, color| color.map(quantised))?,
+            photo: encoded(&photo, |_, color| color.map(quantised))?,
+            error: encoded(&error, |[x, y], [error, counted, _]| match counted < 0.5 {
+                true => IGNORED[((x + y) / STRIPE % 2) as usize],
+                false => color(&INFERNO, error / counted / ERROR_SCALE),
+            })?,
+            has_ignored: pair.ignored.contains(&true),
+            depth: encoded(&depth, |_, [place, covered, _]| match covered < 0.5 {
                 true => [0; 3],
                 false => color(&VIRIDIS, place / covered),
             })?,
@@ -106,8 +120,10 @@ fn reduced(pixels: &[[f32; 3]], [width, height]: [u32; 2]) -> Result<Picture> {
     Ok(resize(&picture, side(width), side(height), FilterType::Triangle))
 }
 
-fn encoded(picture: &Picture, color: impl Fn([f32; 3]) -> [u8; 3]) -> Result<String> {
-    let bytes: Vec<u8> = picture.pixels().flat_map(|pixel| color(pixel.0)).collect();
+/// The picture's file; `color` makes a pixel's colour of its place and values.
+fn encoded(picture: &Picture, color: impl Fn([u32; 2], [f32; 3]) -> [u8; 3]) -> Result<String> {
+    let bytes: Vec<u8> =
+        picture.enumerate_pixels().flat_map(|(x, y, pixel)| color([x, y], pixel.0)).collect();
     let (width, height) = picture.dimensions();
     let mut file = Vec::new();
     let format = if width * height <= LOSSLESS {
