@@ -105,6 +105,11 @@ pub enum Warning<'a> {
         /// The view.
         name: &'a str,
     },
+    /// Nothing keeps other processes from writing to the run's folder.
+    Unguarded {
+        /// The folder.
+        folder: &'a Path,
+    },
     /// The rays of the last steps had no samples.
     Empty {
         /// Steps taken.
@@ -129,6 +134,11 @@ impl fmt::Display for Warning<'_> {
                 few(names)
             ),
             Self::NotMeasured { name } => write!(f, "{name} is not measured: its mask ignores every pixel"),
+            Self::Unguarded { folder } => write!(
+                f,
+                "the file system of {} has no locks, so nothing keeps another training out of this folder",
+                folder.display()
+            ),
             Self::Empty { step } => write!(
                 f,
                 "at step {step} the rays meet nothing any more, the field has become empty; try a smaller \

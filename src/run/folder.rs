@@ -5,16 +5,19 @@ use super::log_writer::LogWriter;
 use crate::config::Config;
 use crate::field::checkpoint::{self, Checkpoint};
 use crate::support::file::write_json;
+use crate::support::lock::{FolderLock, is_used};
 use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// The folder of a run.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// The folder of a run. Where one is to be written, no other process writes to it as long as this value lives.
+#[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
+    /// `None` where it is only read.
+    lock: Option<FolderLock>,
 }
 
 impl RunFolder {
@@ -27,10 +30,14 @@ impl RunFolder {
     /// The file with the page about the run.
     pub const REPORT: &'static str = "report.html";
 
-    /// A folder that need not be there yet; nothing is touched.
+    /// A folder that is only read, and need not be there yet; nothing is touched.
     #[must_use]
     pub fn new(path: &Path) -> Self {
-        Self { path: path.to_owned() }
+        Self { path: path.to_owned(), lock: None }
+    }
+
+    fn locked(path: &Path) -> Result<Self> {
+        Ok(Self { path: path.to_owned(), lock: Some(FolderLock::alone(path)?) })
     }
 
     /// The folder that `run`, itself or a file in it, stands for.
@@ -52,10 +59,11 @@ impl RunFolder {
     /// A folder for a new run, which must not hold anything.
     ///
     /// # Errors
-    /// When it does, or is no folder.
+    /// When it does, is no folder, cannot be written to, or another process trains into it.
     pub fn unused(path: &Path) -> Result<Self> {
-        let folder = Self::new(path);
-        if folder.is_used()? {
+        is_used(path)?;
+        let folder = Self::locked(path)?;
+        if is_used(path)? {
             let found = format!("the folder {} is not empty; ", path.display());
             bail!(Advised::new(found, Remedy::UsedFolder, ""));
         }
@@ -65,30 +73,31 @@ impl RunFolder {
     /// A folder for a new run, which replaces what an earlier one left.
     ///
     /// # Errors
-    /// When it is no folder.
+    /// When it is no folder, cannot be written to, or another process trains into it.
     pub fn to_overwrite(path: &Path) -> Result<Self> {
-        let folder = Self::new(path);
-        folder.is_used()?;
-        Ok(folder)
+        is_used(path)?;
+        Self::locked(path)
     }
 
     /// The folder of a run to go on with, and its checkpoint.
     ///
     /// # Errors
-    /// When there is no checkpoint, or it cannot be used.
+    /// When there is no checkpoint, it cannot be used, or another process trains into the folder.
     pub fn to_resume(path: &Path) -> Result<(Self, Checkpoint)> {
-        let file = checkpoint::locate(path).context("there is nothing to resume")?;
-        Ok((Self::new(path), Checkpoint::load(&file)?))
+        let locate = || checkpoint::locate(path).context("there is nothing to resume");
+        if !path.exists() {
+            locate()?;
+        }
+        // Before the checkpoint is read, which another process might replace.
+        let folder = Self::locked(path)?;
+        let file = locate()?;
+        Ok((folder, Checkpoint::load(&file)?))
     }
 
-    fn is_used(&self) -> Result<bool> {
-        match fs::read_dir(&self.path) {
-            Ok(mut entries) => Ok(entries.next().is_some()),
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
-            Err(error) => {
-                Err(error).with_context(|| format!("{} cannot be used as a folder", self.path.display()))
-            }
-        }
+    /// Whether nothing keeps other processes from writing to it, since its file system has no locks.
+    #[must_use]
+    pub fn is_unguarded(&self) -> bool {
+        self.lock.as_ref().is_some_and(|lock| !lock.is_effective())
     }
 
     /// Where it is.
@@ -163,12 +172,16 @@ mod tests {
         let run = RunFolder::unused(folder.path()).expect("empty");
         fs::write(run.report(), "earlier").expect("writable");
         fs::write(folder.path().join("notes.txt"), "kept").expect("writable");
-        assert!(RunFolder::unused(folder.path()).is_err());
+        let in_use = RunFolder::to_overwrite(folder.path()).expect_err("another run has it");
+        assert!(in_use.to_string().contains(&format!("process {} writes to it", std::process::id())));
+        drop(run);
+        let used = RunFolder::unused(folder.path()).expect_err("an earlier run was there");
+        assert!(used.to_string().contains("is not empty"), "{used}");
         let run = RunFolder::to_overwrite(folder.path()).expect("a folder");
         run.begin(&Config::default(), None).expect("writable");
         assert!(!run.report().exists() && folder.path().join("notes.txt").exists());
         assert!(run.config().is_some_and(|text| text.contains("\"grid\"")));
-        assert_eq!(RunFolder::find(&folder.path().join(RunFolder::LOG)).expect("there"), run);
-        assert!(RunFolder::unused(&folder.path().join(RunFolder::LOG)).is_err(), "a file is no folder");
+        assert_eq!(RunFolder::find(&run.path.join(RunFolder::LOG)).expect("there").path, run.path);
+        assert!(RunFolder::unused(&run.path.join(RunFolder::LOG)).is_err(), "a file is no folder");
     }
 }

@@ -18,7 +18,6 @@ use crate::field::Field;
 use crate::field::checkpoint::Metadata;
 use crate::field::trainer::Trainer;
 use crate::gpu::Gpu;
-use crate::support::file::writable_folder;
 use crate::support::metrics::PSNR_CAP_DB;
 use anyhow::{Context, Result, anyhow};
 pub use ending::NoTestViews;
@@ -92,7 +91,9 @@ impl<'a> TrainingRun<'a> {
         let Resolved { metadata, plan, test, .. } = &resolved;
         observer.notice(&Event::Resolved { metadata, plan, gpu: &gpu, test_views: test.len() });
         resolved.check_memory(&gpu, dataset, observer)?;
-        writable_folder(folder.path())?;
+        if folder.is_unguarded() {
+            observer.notice(&Event::Warning(Warning::Unguarded { folder: folder.path() }));
+        }
         let clock = Instant::now();
         let views = resolved.photos(dataset).load(&gpu, &resolved.plan, observer)?;
         let load_seconds = clock.elapsed().as_secs_f64();

@@ -4,7 +4,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use super::temporary::{remove_leftovers, temporary_in};
+use anyhow::{Context, Result};
 use serde::Serialize;
 
 /// Writes a file through `write` under a temporary name in the same folder, syncs it to disk and renames
@@ -16,7 +17,8 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) ->
     };
     let attempt = || -> Result<()> {
         let temporary = temporary_in(folder)?;
-        let mut writer = BufWriter::new(temporary.reopen()?);
+        // Not opened again: some systems let no other opening write to a locked file.
+        let mut writer = BufWriter::new(temporary.as_file().try_clone()?);
         write(&mut writer)?;
         writer.flush()?;
         writer.get_ref().sync_all()?;
@@ -39,28 +41,14 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     })
 }
 
-/// Creates the folder where there is none, and tries whether files can be written to it.
+/// Creates the folder where there is none, and tries whether files can be written to it. What processes that have ended left
+/// half written in it is removed.
 pub fn writable_folder(path: &Path) -> Result<()> {
     let show = path.display();
     std::fs::create_dir_all(path).with_context(|| format!("creating the folder {show}"))?;
-    let attempt = tempfile::Builder::new().prefix(".nerf-").tempfile_in(path);
-    attempt.with_context(|| format!("the folder {show} cannot be written to"))?;
+    temporary_in(path).with_context(|| format!("the folder {show} cannot be written to"))?;
+    remove_leftovers(path);
     Ok(())
-}
-
-fn temporary_in(folder: &Path) -> Result<tempfile::NamedTempFile> {
-    ensure!(folder.is_dir(), "the folder {} does not exist", folder.display());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".nerf-").suffix(".part");
-    // Temporary files are private by default; results get the permissions any new file would get.
-    #[cfg(unix)]
-    let permissions: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
-    #[cfg(unix)]
-    builder.permissions(permissions);
-    // The error itself names the temporary file, which says nothing to anybody.
-    let reason =
-        |error: std::io::Error| anyhow!("cannot create a file in {}: {}", folder.display(), error.kind());
-    builder.tempfile_in(folder).map_err(reason)
 }
 
 #[cfg(test)]

@@ -155,6 +155,10 @@ fn an_interrupted_training_goes_on() {
     while !is_under_way() && clock.elapsed() < Duration::from_secs(120) {
         std::thread::sleep(Duration::from_millis(20));
     }
+    for how in ["--resume", "--overwrite"] {
+        let second = quietly(&["train", text(&TOYS), "--out", text(&parts), how]).assert();
+        second.code(1).stderr(contains(format!("process {} writes to it", child.id())));
+    }
     let signalled = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(signalled.expect("kill runs").success());
     assert_eq!(child.wait().expect("ends").code(), Some(0), "interrupting is no failure");
@@ -339,19 +343,19 @@ impl Observer for Listener {
 fn a_run_without_a_terminal_tells_what_happens_and_stops_when_asked() {
     let gpu = Arc::new(Gpu::open(&adapter::choose(None).expect("an adapter")).expect("it opens"));
     let dataset = Dataset::open(&TOYS, &OpenOptions::default()).expect("a dataset");
-    let folder = RunFolder::unused(&place("library")).expect("empty");
+    let path = place("library");
     let stop = Arc::new(AtomicBool::new(false));
     let mut listener = Listener { told: Vec::new(), stop: Arc::clone(&stop), last_step: 32 };
     let train = |end: u32, listener: &mut Listener| {
         let budget = Budget { steps: Some(end), seconds: None };
         let options = TrainOptions { config: Some(PathBuf::from(SMOKE)), budget, ..TrainOptions::default() };
-        let resolved = match RunFolder::to_resume(folder.path()) {
-            Ok((_, checkpoint)) => Resolved::resume(&options, &dataset, &gpu, checkpoint),
-            Err(_) => Resolved::new_run(&options, &dataset, &gpu),
+        let (folder, resolved) = match RunFolder::to_resume(&path) {
+            Ok((folder, checkpoint)) => (folder, Resolved::resume(&options, &dataset, &gpu, checkpoint)),
+            Err(_) => (RunFolder::unused(&path).expect("empty"), Resolved::new_run(&options, &dataset, &gpu)),
         };
         let evaluation = EvaluationOptions { every: Some(32), at_end: EvaluationAtEnd::All };
         let (gpu, resolved) = (Arc::clone(&gpu), resolved.expect("it fits"));
-        let run = TrainingRun { gpu, dataset: &dataset, resolved, folder: folder.clone(), evaluation };
+        let run = TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation };
         let mut session = run.begin(listener).expect("it begins");
         let end = session.train(&stop, listener).expect("it trains");
         let views = session.evaluate(&end, listener).expect("measured");
@@ -371,7 +375,7 @@ fn a_run_without_a_terminal_tells_what_happens_and_stops_when_asked() {
     assert!(end.step == 48 && !end.interrupted, "{end:?}");
     assert_eq!(views.map(|views| views.count()), Ok(5));
     assert_eq!(listener.told.last(), Some(&"measuring"));
-    let log = folder.log().expect("a log");
+    let log = RunFolder::new(&path).log().expect("a log");
     assert_eq!((log.starts.len(), log.damaged, log.steps.last().map(|row| row.step)), (2, 0, Some(48)));
 }
 
