@@ -1,6 +1,6 @@
 //! What each setting may be.
 
-use super::{Accumulation, Config};
+use super::{Accumulation, Background, Config};
 use anyhow::{Result, bail};
 
 /// Most rays or samples of a step: what every adapter dispatches along one axis, 65,535 workgroups of 64.
@@ -47,6 +47,9 @@ impl Config {
             }
             Ok(())
         };
+        if let Background::Color(color) = self.background {
+            color.iter().try_for_each(|&part| real("background", part.into(), 0.0, 1e6))?;
+        }
         real("march.samples_per_ray", march.samples_per_ray, 1.0, 1e6)?;
         real("march.longest_step", march.longest_step, 1.0, 64.0)?;
         real("march.cone", march.cone, 1e-5, 0.1)?;

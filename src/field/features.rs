@@ -3,6 +3,7 @@
 use crate::camera::LensKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 
 /// What a scene has, apart from the configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,6 +23,11 @@ pub struct SceneFeatures {
     pub depth: bool,
     /// Scene-linear brightness that is 1 in the field: that of a typical pixel; 1 for images of 8 or 16 bits.
     pub grey: f32,
+}
+
+impl SceneFeatures {
+    /// What `grey` may be: numbers far from it are still in single precision.
+    pub const GREY: RangeInclusive<f32> = 1e-25..=1e25;
 }
 
 impl Default for SceneFeatures {

@@ -109,10 +109,12 @@ impl Trainer {
     /// When the state is of another layout, or the device was lost.
     pub fn restore(&mut self, state: &State) -> Result<()> {
         self.field.set_arrays(&state.arrays)?;
-        let State { rays, step_excess, .. } = *state;
+        let State { step_excess, .. } = *state;
+        // The configuration may have less room for them than it had.
+        let rays = state.rays.min(self.field.plan.config.batch.rays as u32);
         let counters = Counters { rays, rays_used: 1, step_excess, ..Counters::default() };
         self.field.gpu.write(self.workspace.get("counters"), 0, &[counters]);
-        self.workspace.set_dispatch(&self.field.gpu, dispatch::RAYS, state.rays as usize);
+        self.workspace.set_dispatch(&self.field.gpu, dispatch::RAYS, rays as usize);
         let mut encoder = self.field.gpu.encoder("restore");
         self.workspace.tensor("d_table").clear(&mut encoder);
         encoder.clear_buffer(&self.workspace.get("gradient_range").raw, 0, None);

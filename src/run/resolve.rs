@@ -131,12 +131,15 @@ impl Config {
 /// The description with its names and its end.
 fn ended(metadata: Metadata, options: &TrainOptions, gpu: &Gpu, earlier: Option<Budget>) -> Result<Metadata> {
     let budget = options.budget(gpu.is_cpu(), earlier);
-    budget.validate()?;
     if metadata.config.deterministic && budget.seconds.is_some() {
         let why = ": how many steps fit into a time differs from run to run";
         bail!(Advised::new("a deterministic run needs ", Remedy::StepsAlone, why));
     }
-    Ok(Metadata { dataset: options.dataset.clone(), adapter: gpu.info.name.clone(), budget, ..metadata })
+    let metadata =
+        Metadata { dataset: options.dataset.clone(), adapter: gpu.info.name.clone(), budget, ..metadata };
+    // What is not sound now would be found when its first checkpoint is read.
+    metadata.validate()?;
+    Ok(metadata)
 }
 
 fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<Metadata> {

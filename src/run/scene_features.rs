@@ -72,6 +72,9 @@ fn grey(dataset: &Dataset) -> Result<f32> {
         Ok(())
     })?;
     let grey = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp() as f32;
-    ensure!(grey.is_normal(), "the photos are as dark or as bright as {grey:e}; scale them to about 1");
+    ensure!(
+        SceneFeatures::GREY.contains(&grey),
+        "the photos are as dark or as bright as {grey:e}; scale them to about 1"
+    );
     Ok(grey)
 }
