@@ -9,10 +9,11 @@ pub mod gallery;
 pub mod map;
 mod optics;
 mod poses;
+mod roll;
 mod spread;
 mod view_directions;
 
-use crate::capture::diagnostics::Diagnostic;
+use crate::capture::diagnostics::{Diagnostic, Severity};
 pub use coverage::Coverage;
 pub use optics::Optics;
 pub use spread::Spread;
@@ -50,11 +51,10 @@ impl Survey {
         let coverage = Coverage::of(&scene);
         let optics = Optics::of(&scene);
         let misread = axis_convention::examine(&scene, &directions);
-        let mut findings = Vec::new();
-        if misread.is_empty() {
-            // Where all poses are read the wrong way, single ones tell nothing.
+        let mut findings = directions.findings(&scene);
+        // Where all poses are read the wrong way, single ones tell nothing.
+        if misread.as_ref().is_none_or(|finding| finding.severity > Severity::Warning) {
             findings.extend(poses::outliers(&scene, &directions));
-            findings.extend(directions.findings(&scene));
             findings.extend(coverage.findings(&scene));
         }
         findings.extend(misread);
@@ -110,6 +110,11 @@ impl<'a> CameraSet<'a> {
     fn extent(&self) -> f64 {
         let mean = self.axes.iter().map(|axis| axis.origin).sum::<DVec3>() / self.count() as f64;
         self.axes.iter().map(|axis| axis.origin.distance(mean)).fold(0.0, f64::max)
+    }
+
+    /// Whether all cameras are at one place, but for what single precision cannot tell.
+    fn is_one_place(&self) -> bool {
+        self.extent() <= 3e-7 * self.focus.point.length().max(1e-2)
     }
 
     /// The views for which something holds.

@@ -80,7 +80,7 @@ fn poses_read_the_wrong_way_are_told_with_the_remedy() {
         };
         *matrix = json!([inverse(0), inverse(1), inverse(2), [0.0, 0.0, 0.0, 1.0]]);
     });
-    toys.info().expect(0, "warning", &["probably world-to-camera:", "write the inverse of every"], &[]);
+    toys.info().expect(0, "warning", &["may be world-to-camera:", "write the inverse of every"], &[]);
 }
 
 #[test]

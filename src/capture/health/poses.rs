@@ -146,7 +146,7 @@ pub(super) fn repeated(scene: &CameraSet<'_>) -> Vec<[usize; 2]> {
     let extent = scene.extent();
     let cameras: Vec<_> = scene.cameras().collect();
     // All cameras at one place is another matter.
-    if extent <= 1e-9 * (1.0 + scene.focus.point.length()) {
+    if scene.is_one_place() {
         return Vec::new();
     }
     let is_same = |a: usize, b: usize| {

@@ -1,5 +1,6 @@
 //! Where the cameras look: the point their axes meet in, how nearly, and from how many sides.
 
+use super::roll::STEEP;
 use super::{CameraSet, Diagnostic, Spread};
 use crate::camera::orbit::Orbit;
 use crate::capture::focus::FocusKind;
@@ -61,8 +62,6 @@ const PARALLEL_DEGREES: f64 = 2.0;
 /// Axes within this angle look from one side.
 const FACING_DEGREES: f64 = 40.0;
 
-/// Cosine between the view and the upright of a camera that looks up or down.
-const STEEP: f64 = 0.9;
 /// Part of the pictures that are rolled on purpose now and then.
 const MANY_ROLLED: f64 = 0.25;
 
@@ -103,7 +102,7 @@ impl ViewDirections {
             return findings;
         }
         let extent = scene.extent();
-        if extent <= 1e-9 * (1.0 + self.focus.length()) {
+        if scene.is_one_place() {
             findings.push(Diagnostic::warning(format!(
                 "all {} cameras are at the same place: nothing tells how far away things are; check that \
                  `transform_matrix` is camera-to-world, with the position in its last column, or take photos from \
