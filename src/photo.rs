@@ -42,9 +42,10 @@ impl From<Image> for Photo {
     }
 }
 
-/// What keeps training from beginning where masks ignore all of its photos.
-pub(crate) fn nothing_counts(photos: usize) -> Advised {
+/// What keeps training from beginning where masks ignore all of its photos; `inverts` if masks were inverted.
+pub(crate) fn nothing_counts(photos: usize, inverts: bool) -> Advised {
     let photos = count(photos, "training photo");
     let found = format!("the masks ignore every pixel of all {photos}; they may be inverted: ");
-    Advised::new(found, Remedy::InvertMasks, "")
+    let remedy = if inverts { Remedy::LeaveMasks } else { Remedy::InvertMasks };
+    Advised::new(found, remedy, "")
 }

@@ -8,6 +8,7 @@ mod frames;
 mod intrinsics;
 mod json;
 mod listing;
+mod mask;
 pub(crate) mod notes;
 mod open;
 mod part;
@@ -93,6 +94,13 @@ pub struct Frame {
     /// Whether the alpha is in the image file.
     has_own_alpha: bool,
     source: photo_source::PhotoSource,
+}
+
+impl Frame {
+    /// Whether there is a mask whose black pixels are those to ignore.
+    pub(crate) fn ignores_black(&self) -> bool {
+        self.source.sidecars.masks.iter().any(|mask| mask.ignores == mask::Ignores::Black)
+    }
 }
 
 /// Choices when opening a dataset.

@@ -50,6 +50,11 @@ impl Diagnostic {
         Self { severity, message: message.into(), remedy: None, frames: Vec::new() }
     }
 
+    /// Something with a choice of the user's to make.
+    pub fn advise(severity: Severity, advised: Advised) -> Self {
+        Self { remedy: Some(advised.remedy.clone()), ..Self::new(severity, advised.to_string()) }
+    }
+
     /// The same, about some frames.
     #[must_use]
     pub fn about(self, frames: Vec<usize>) -> Self {
@@ -66,7 +71,7 @@ impl fmt::Display for Diagnostic {
 impl From<Advised> for Diagnostic {
     /// Training would fail.
     fn from(advised: Advised) -> Self {
-        Self { remedy: Some(advised.remedy.clone()), ..Self::error(advised.to_string()) }
+        Self::advise(Severity::Error, advised)
     }
 }
 

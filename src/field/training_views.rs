@@ -8,7 +8,6 @@ use crate::field::{self, Plan};
 use crate::gpu::Gpu;
 use crate::gpu::paged_array::{PageCapacity, PagedArray, rows_of};
 use crate::photo::Photo;
-use crate::photo::nothing_counts;
 use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Context, Result, bail, ensure};
 use std::sync::Arc;
@@ -104,7 +103,7 @@ impl TrainingViews {
     pub(crate) fn check_for(&self, plan: &Plan) -> Result<()> {
         let (photos, cameras) = (self.silhouettes.len(), self.cameras.len());
         ensure!(photos == cameras, "{photos} photos were added for {cameras} cameras");
-        ensure!(!self.on_device.is_empty(), nothing_counts(photos));
+        ensure!(!self.on_device.is_empty(), "masks ignore every pixel of all {photos} photos");
         ensure!(
             self.record == plan.record() && self.space == plan.space,
             "the photos were loaded for another plan, with other masks, depth, bits or another box; load them again"

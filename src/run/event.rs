@@ -100,6 +100,11 @@ pub enum Warning<'a> {
         /// Number of all training photos.
         all: usize,
     },
+    /// Masks ignore no pixel of any training photo.
+    UselessMasks {
+        /// Number of photos with masks.
+        masks: usize,
+    },
     /// The mask of a test view ignores every pixel, so it is not measured.
     NotMeasured {
         /// The view.
@@ -132,6 +137,11 @@ impl fmt::Display for Warning<'_> {
                 "masks ignore every pixel of {} of {all} training photos, which add nothing: {}",
                 names.len(),
                 few(names)
+            ),
+            Self::UselessMasks { masks } => write!(
+                f,
+                "the masks of {} ignore no pixel; what is to be ignored must be black, 0 in red, green and blue",
+                count(*masks, "training photo")
             ),
             Self::NotMeasured { name } => write!(f, "{name} is not measured: its mask ignores every pixel"),
             Self::Unguarded { folder } => write!(

@@ -9,7 +9,8 @@ use crate::field::trainer::Trainer;
 use crate::field::training_views::TrainingViews;
 use crate::field::{Field, Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
-use anyhow::Result;
+use crate::photo::nothing_counts;
+use anyhow::{Result, ensure};
 use std::sync::Arc;
 
 /// The photos that a field is trained on: some frames of a dataset.
@@ -49,8 +50,10 @@ impl<'a> TrainingPhotos<'a> {
         let (dataset, frames) = (self.dataset, self.frames);
         let mut views = TrainingViews::new(gpu, plan, &self.cameras())?;
         let mut ignored = Vec::new();
+        let mut ignored_pixels = 0;
         observer.notice(&Event::Loading { done: 0, all: frames.len() });
         dataset.stream(frames, plan.features.depth, &mut |position, photo| {
+            ignored_pixels += photo.count_ignored();
             if photo.is_ignored() {
                 ignored.push(dataset.frames[frames[position]].name.as_str());
             }
@@ -58,6 +61,11 @@ impl<'a> TrainingPhotos<'a> {
             observer.notice(&Event::Loading { done: position + 1, all: frames.len() });
             Ok(())
         })?;
+        ensure!(ignored.len() < frames.len(), nothing_counts(frames.len(), dataset.reading.invert_masks));
+        let masks = frames.iter().filter(|&&index| dataset.frames[index].has_mask).count();
+        if masks > 0 && ignored_pixels == 0 {
+            observer.notice(&Event::Warning(Warning::UselessMasks { masks }));
+        }
         if !ignored.is_empty() {
             let warning = Warning::IgnoredPhotos { names: &ignored, all: frames.len() };
             observer.notice(&Event::Warning(warning));

@@ -1,6 +1,7 @@
 //! `nerf info`: healthy datasets raise no alarm, and each kind of damage is named with what to do.
 
 mod files;
+mod masks;
 mod toys;
 
 use crate::program::nerf;

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, ensure};
 
-use super::sidecars::{Depth, Ignores, Mask, Sidecars};
+use super::sidecars::{Depth, Sidecars};
 use super::{Dataset, Frame, prefetch};
 use crate::capture::image_file::load_depth;
 use crate::capture::image_file::{Multiplied, Turn, Window, crop, nearest, reduce_any, reduce_depth};
@@ -121,10 +121,9 @@ impl Frame {
     /// Pixels that a mask ignores, at the camera's size; empty if there are none.
     fn ignored(&self, invert: bool) -> Result<Vec<bool>> {
         let mut all: Vec<bool> = Vec::new();
-        for Mask { path, ignores } in &self.source.sidecars.masks {
-            let mask = Image::load(path)?;
-            let ignored = ignored(&mask.brightness(), *ignores, invert);
-            let ignored = self.fitted(ignored, mask.size());
+        for mask in &self.source.sidecars.masks {
+            let (size, ignored) = mask.ignored(invert)?;
+            let ignored = self.fitted(ignored, size);
             if all.is_empty() {
                 all = ignored;
             } else {
@@ -185,32 +184,5 @@ impl PhotoSource {
     /// Width and height of the turned picture.
     pub(super) fn upright_size(&self) -> [u32; 2] {
         self.turn.map_or(self.stored, |turn| turn.size(self.stored))
-    }
-}
-
-/// Which pixels of a mask mean that the photo's are ignored. White is what reaches half of the mask's own
-/// brightest, so that masks of zeros and ones mean the same as those of zeros and 255s.
-fn ignored(brightness: &[u16], ignores: Ignores, invert: bool) -> Vec<bool> {
-    let brightest = brightness.iter().copied().max().unwrap_or(0);
-    let is_ignored = |value: u16| match ignores {
-        Ignores::Black => value == 0 || u32::from(value) * 2 < u32::from(brightest),
-        Ignores::AllButBlack => value > 0,
-    };
-    brightness.iter().map(|&value| is_ignored(value) != invert).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn white_is_half_of_the_brightest() {
-        let ones = [0, 257, 257];
-        assert_eq!(ignored(&ones, Ignores::Black, false), [true, false, false]);
-        assert_eq!(ignored(&ones, Ignores::Black, true), [false, true, true]);
-        assert_eq!(ignored(&ones, Ignores::AllButBlack, false), [false, true, true]);
-        assert_eq!(ignored(&[0, 32000, 33000, 65535], Ignores::Black, false), [true, true, false, false]);
-        assert_eq!(ignored(&[0, 0], Ignores::Black, false), [true, true], "nothing but black");
-        assert_eq!(ignored(&[9, 9], Ignores::Black, false), [false, false], "nothing but white");
     }
 }

@@ -11,7 +11,7 @@ use super::listing::{FrameEntry, Listing};
 use super::notes::Notes;
 use super::photo_source::PhotoSource;
 use super::sidecars::{Finder, Sidecars};
-use super::{Frame, OpenOptions, Split, frames};
+use super::{Frame, OpenOptions, Split, frames, mask};
 use crate::capture::diagnostics::Severity;
 use crate::capture::image_file::Turn;
 use crate::capture::image_file::{FORMATS, Header};
@@ -171,6 +171,7 @@ impl Present {
             members.push((entry.split, canonical(&frame.path)));
             frames.push(frame);
         }
+        mask::find_channels(&mut frames, options.allow_missing, notes)?;
         remark_on_masks(&frames, &finder, is_any_found && reading.invert_masks, notes);
         Ok(Built { frames, members, damaged })
     }
@@ -195,16 +196,17 @@ fn remark_on_masks(frames: &[Frame], finder: &Finder, inverts: bool, notes: &mut
 fn frame(
     entry: &FrameEntry,
     (path, header): (PathBuf, Header),
-    sidecars: Sidecars,
+    mut sidecars: Sidecars,
     reading: &Reading,
     notes: &mut Notes,
 ) -> Result<Frame> {
     let stored = [header.width, header.height];
     let turn = turn(entry, &header, notes);
     let upright = turn.map_or(stored, |turn| turn.size(stored));
-    for mask in &sidecars.masks {
-        let mask = Header::read(&mask.path)?;
-        let size = [mask.width, mask.height];
+    for mask in &mut sidecars.masks {
+        let header = Header::read(&mask.path)?;
+        mask.has_alpha = header.has_alpha;
+        let size = [header.width, header.height];
         if size != stored && size != upright {
             let message = "its mask has another size; each pixel takes the nearest of the mask's";
             notes.frame(Severity::Note, &entry.label, message);

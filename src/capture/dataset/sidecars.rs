@@ -20,6 +20,7 @@ use anyhow::Result;
 use super::frames;
 use super::json::Fields;
 use super::listing::{DepthEntry, FrameEntry};
+use super::mask::{Ignores, Mask};
 use super::notes::Notes;
 use crate::capture::diagnostics::Severity;
 use crate::capture::image_file::Header;
@@ -41,20 +42,6 @@ impl Sidecars {
         self.masks.retain(|mask| Header::read(&mask.path).map_err(|error| errors.push(error)).is_ok());
         errors
     }
-}
-
-/// A mask's file.
-#[derive(Clone, Debug)]
-pub(super) struct Mask {
-    pub(super) path: PathBuf,
-    pub(super) ignores: Ignores,
-}
-
-/// Which pixels of a mask mean that the photo's are ignored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ignores {
-    Black,
-    AllButBlack,
 }
 
 /// A depth map's file.
@@ -105,7 +92,7 @@ impl<'a> Finder<'a> {
         let mut masks = Vec::new();
         if let Some(listed) = &entry.mask_path {
             match frames::locate(self.root, listed) {
-                Some((path, _)) => masks.push(Mask { path, ignores: Ignores::Black }),
+                Some((path, _)) => masks.push(Mask::new(path, Ignores::Black)),
                 None => notes.frame(
                     Severity::Warning,
                     &entry.label,
@@ -114,11 +101,11 @@ impl<'a> Finder<'a> {
             }
         }
         let in_folder = self.in_masks_folder(image);
-        masks.extend(in_folder.map(|path| Mask { path, ignores: Ignores::Black }));
+        masks.extend(in_folder.map(|path| Mask::new(path, Ignores::Black)));
         masks.dedup_by(|a, b| same(&a.path, &b.path));
         let dynamic = named(image, |stem| joined([OsStr::new("dynamic_mask_"), stem, OsStr::new(".png")]));
         if let Some(path) = dynamic.filter(|path| self.is_there(path)) {
-            masks.push(Mask { path, ignores: Ignores::AllButBlack });
+            masks.push(Mask::new(path, Ignores::AllButBlack));
         }
         Sidecars { masks, alpha: self.alpha(image), depth: self.depth(entry, notes) }
     }

@@ -1,14 +1,15 @@
 //! What single photos look like, and which stand out: blurred, dark, blown out, or shown twice.
 
 mod grey;
+mod masks;
 
 use super::{Diagnostic, Spread, names};
 use crate::capture::dataset::Dataset;
 use crate::photo::Photo;
-use crate::photo::nothing_counts;
 use crate::support::format::count;
 use grey::{Grey, THUMBNAIL};
-use std::collections::{HashMap, HashSet};
+use masks::Ignored;
+use std::collections::HashMap;
 
 /// Longest side that sharpness is measured at, in pixels: finer detail is noise as often as detail.
 const MOST_SIDE: u32 = 1024;
@@ -53,6 +54,8 @@ pub struct Look {
     pub is_empty: bool,
     /// Whether masks ignore every pixel: there is nothing to train on.
     pub is_ignored: bool,
+    /// What masks ignore of it.
+    ignored: Ignored,
     /// Whether it has one brightness everywhere.
     is_flat: bool,
     /// Tells pictures of different content apart.
@@ -82,6 +85,7 @@ impl Look {
             white: white.filter(|_| !image.is_hdr()).unwrap_or(0.0),
             is_empty,
             is_ignored: photo.is_ignored(),
+            ignored: Ignored::of(photo),
             is_flat: coarse.variance() <= FLAT,
             fingerprint: fine.fingerprint(),
             thumbnail: coarse.thumbnail(),
@@ -130,7 +134,7 @@ impl Gallery {
                 .flatten()
                 .collect();
         findings.extend(self.blank(dataset));
-        findings.extend(self.ignored(dataset));
+        findings.extend(self.about_masks(dataset));
         findings.sort_by_key(|finding| finding.severity);
         findings
     }
@@ -151,21 +155,15 @@ impl Gallery {
                 "drop those that are not meant to be white",
             ),
         ];
-        kinds.into_iter().filter_map(|(holds, what, remedy)| {
-            let frames = self.which(|(_, look)| holds(look));
+        // Where that holds for all, it is an error, and not said twice.
+        let is_said = self.leaves_nothing(dataset);
+        kinds.into_iter().filter_map(move |(holds, what, remedy)| {
+            let frames = self.which(|(_, look)| holds(look) && !(look.is_ignored && is_said));
             let number = count(frames.len(), "photo");
             let verb = if frames.len() == 1 { "shows" } else { "show" };
             let message = format!("{number} {verb} {what}: {}; {remedy}", names(dataset, &frames));
             (!frames.is_empty()).then(|| Diagnostic::warning(message).about(frames))
         })
-    }
-
-    /// Masks that leave nothing to train on.
-    fn ignored(&self, dataset: &Dataset) -> Option<Diagnostic> {
-        let ignored: HashSet<usize> = self.which(|(_, look)| look.is_ignored).into_iter().collect();
-        let nothing_is_left = !dataset.train.is_empty() && dataset.train.iter().all(|i| ignored.contains(i));
-        nothing_is_left
-            .then(|| Diagnostic::from(nothing_counts(dataset.train.len())).about(dataset.train.clone()))
     }
 
     /// Whether two frames, which have one pose, show different pictures.

@@ -102,6 +102,17 @@ impl Image {
         }
     }
 
+    /// The alpha channel, `[height * width]`, 65535 is 1.
+    pub(crate) fn alpha(&self) -> Vec<u16> {
+        match &self.pixels {
+            Pixels::Srgb8(pixels) => pixels.iter().map(|pixel| u16::from(pixel[3]) * 257).collect(),
+            Pixels::Srgb16(pixels) => pixels.iter().map(|pixel| pixel[3]).collect(),
+            Pixels::Linear(pixels) => {
+                pixels.iter().map(|pixel| (pixel[3].clamp(0.0, 1.0) * 65535.0).ceil() as u16).collect()
+            }
+        }
+    }
+
     /// The red channel, `[height * width]`, 65535 is 1.
     pub(crate) fn red(&self) -> Vec<u16> {
         match &self.pixels {

@@ -51,6 +51,19 @@ impl FileFormat {
     }
 }
 
+/// Whether pixels are only about those that were written: in JPEG, and in WebP whose first picture is not lossless.
+pub(super) fn is_lossy(path: &Path) -> Result<bool> {
+    let mut begin = Vec::new();
+    File::open(path)?.take(34).read_to_end(&mut begin)?;
+    // The picture's chunk comes first, or after an extended header.
+    let is_lossless = [12, 30].iter().any(|&at| begin[at.min(begin.len())..].starts_with(b"VP8L"));
+    Ok(match FileFormat::detect(path)? {
+        FileFormat::Common(ImageFormat::Jpeg) => true,
+        FileFormat::Common(ImageFormat::WebP) => !is_lossless,
+        _ => false,
+    })
+}
+
 pub(super) fn header(path: &Path, format: ImageFormat) -> Result<Header> {
     let mut decoder = open(path, format)?;
     let (width, height) = decoder.dimensions();

@@ -113,6 +113,8 @@ impl Preflight<'_> {
             "looked_at": gallery.looks.len(),
             "sharpness": gallery.sharpness(),
             "brightness": gallery.brightness(),
+            "ignored_by_masks": gallery.ignored_part(self.dataset),
+            "ignored_of_masked": gallery.ignored(self.dataset),
         }))
     }
 

@@ -24,6 +24,7 @@ impl Preflight<'_> {
             ("coverage", self.about_coverage()),
             ("views", about_view_directions(&self.survey.directions, self.survey.views.len())),
             ("photos", self.about_photos()),
+            ("masks", self.about_masks()),
             ("memory", self.memory.as_ref().map_or_else(Vec::new, about_memory)),
             ("left out", self.about_left_out()),
         ];
@@ -168,6 +169,14 @@ impl Preflight<'_> {
             }
         }
         vec![line]
+    }
+
+    fn about_masks(&self) -> Vec<String> {
+        let masked = self.dataset.frames.iter().any(|frame| frame.has_mask);
+        let Some(gallery) = self.gallery.as_ref().filter(|_| masked) else { return Vec::new() };
+        let part = percent(gallery.ignored_part(self.dataset).unwrap_or(0.0));
+        let each = gallery.ignored(self.dataset).describe(percent);
+        vec![format!("ignore {part} of all pixels; {each} of a photo with a mask")]
     }
 
     fn about_left_out(&self) -> Vec<String> {
