@@ -4,7 +4,9 @@
 //! dataset's own, in its own units.
 
 mod alpha_probe;
-mod frames;
+mod file_names;
+mod folders;
+mod guesses;
 mod intrinsics;
 mod json;
 mod listing;
@@ -12,10 +14,12 @@ mod mask;
 pub(crate) mod notes;
 mod open;
 mod part;
+mod photo_files;
 mod photo_source;
 mod pose;
 mod prefetch;
 mod resolved_frames;
+mod search;
 mod sidecars;
 mod splits;
 pub mod transforms;

@@ -181,12 +181,12 @@ fn missing_images_are_told_and_fail_when_none_is_left() {
     result.expect(
         1,
         "error",
-        &["none of the 24 listed images", "put the images where `file_path` says"],
+        &["24 of 24 listed images are missing", "put the images where `file_path` says"],
         &[],
     );
     assert_eq!([&result.json["frames"], &result.json["found"], &result.json["cameras"]], [24, 0, 1]);
     assert!(result.json["box"]["max"][2].is_number() && result.json["memory"]["device_bytes"].is_u64());
-    assert!(result.stderr.contains("training would fail: none of the 24"), "{}", result.stderr);
+    assert!(result.stderr.contains("training would fail: 24 of 24 listed"), "{}", result.stderr);
     nerf().arg("info").arg(toys.path()).assert().code(1).stdout(contains("training would fail; 1 error"));
 }
 

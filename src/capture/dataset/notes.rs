@@ -31,6 +31,11 @@ impl Notes {
         self.add(Severity::Warning, message.into(), None);
     }
 
+    /// What keeps training from beginning.
+    pub(crate) fn error(&mut self, message: impl Into<String>) {
+        self.add(Severity::Error, message.into(), None);
+    }
+
     /// A remark with something to do about it.
     pub(crate) fn advise(&mut self, severity: Severity, advised: Advised) {
         let message = advised.to_string();

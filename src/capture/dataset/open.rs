@@ -7,7 +7,9 @@ use anyhow::{Result, bail, ensure};
 use super::alpha_probe::AlphaProbe;
 use super::listing::FrameEntry;
 use super::notes::Notes;
-use super::resolved_frames::{Built, Present, locate};
+use super::photo_files;
+use super::resolved_frames::{Built, Present, entries, resolve};
+use super::search::Search;
 use super::transforms;
 use super::{Dataset, HoldOut, OpenOptions, Split, splits};
 use crate::camera::Bounds;
@@ -28,7 +30,7 @@ impl Dataset {
         let mut notes = Notes::default();
         let sources = sources(path, &mut notes)?;
         let root = folder_of(&sources[0].1);
-        let mut resolved = Vec::new();
+        let mut lists = Vec::new();
         let mut scene_box = None;
         let files: Vec<&Path> = sources.iter().map(|(_, path)| path.as_path()).collect();
         let listings = transforms::read(&files, &mut notes)?;
@@ -36,12 +38,17 @@ impl Dataset {
         for ((split, _), listing) in sources.iter().zip(listings) {
             // The training file speaks for the scene.
             scene_box = scene_box.or(listing.scene_box);
-            resolved.extend(locate(listing, *split, &root, options.allow_missing, &mut notes)?);
+            lists.push(entries(listing, *split, &mut notes));
         }
-        let present = Present::new(resolved, &root, options, &mut notes)?;
+        let mut search = Search::new(&root);
+        let mut resolved = Vec::new();
+        for list in photo_files::find(lists, &mut search, &mut notes) {
+            resolved.extend(resolve(list, options.allow_missing, &mut notes)?);
+        }
+        let present = Present::new(resolved, &mut search, options, &mut notes)?;
         let bit_depth = present.bit_depth(&mut notes)?;
         let (listed, missing) = (present.listed, present.missing.clone());
-        let Built { frames, members, damaged } = present.build(&root, options, &mut notes)?;
+        let Built { frames, members, damaged } = present.build(search, options, &mut notes)?;
         let members: Vec<_> = members.iter().map(|(s, path)| (*s, path.as_path())).collect();
         let mut splits = splits::assign(&members, options.hold_out, &mut notes);
         thin_out(&mut splits.train, options.reading.max_images, &mut notes);

@@ -7,24 +7,27 @@ use anyhow::{Context, Result, ensure};
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::file_names::natural_order;
 use super::listing::{FrameEntry, Listing};
 use super::notes::Notes;
+use super::photo_files::{Sought, canonical};
 use super::photo_source::PhotoSource;
+use super::search::Search;
 use super::sidecars::{Finder, Sidecars};
-use super::{Frame, OpenOptions, Split, frames, mask};
+use super::{Frame, OpenOptions, Split, mask, photo_files};
 use crate::capture::diagnostics::Severity;
+use crate::capture::image_file::Header;
 use crate::capture::image_file::Turn;
-use crate::capture::image_file::{FORMATS, Header};
 use crate::photo::BitDepth;
 use crate::photo::Reading;
-use crate::support::format::few;
 use crate::support::remedy::{Advised, Remedy};
 
 /// A listed frame and what was found of it.
 pub(super) struct ResolvedFrame {
-    entry: FrameEntry,
-    found: Option<(PathBuf, Header)>,
-    /// Why the image, which is there, is not found.
+    sought: Sought,
+    /// That of its image, where there is one that can be read.
+    header: Option<Header>,
+    /// Why the image, which is there, cannot be read.
     damage: Option<String>,
 }
 
@@ -49,86 +52,78 @@ pub(super) struct Built {
     pub(super) damaged: Vec<String>,
 }
 
-/// Looks for the images of one listing, in natural order of their names.
-pub(super) fn locate(
-    mut listing: Listing,
-    split: Option<Split>,
-    root: &Path,
-    allow_damaged: bool,
-    notes: &mut Notes,
-) -> Result<Vec<ResolvedFrame>> {
+/// The frames of a listing that count, in natural order of their names, in the split that their file stands for.
+pub(super) fn entries(mut listing: Listing, split: Option<Split>, notes: &mut Notes) -> Vec<FrameEntry> {
     notes.append(listing.notes);
     if listing.frames.iter().any(|entry| entry.split.is_some()) {
         listing.frames.retain(|entry| entry.split.is_some());
     }
-    listing.frames.sort_by(|a, b| frames::natural_order(&a.file_path, &b.file_path));
+    listing.frames.sort_by(|a, b| natural_order(&a.file_path, &b.file_path));
+    let in_split = |entry: FrameEntry| FrameEntry { split: split.or(entry.split), ..entry };
+    listing.frames.into_iter().map(in_split).collect()
+}
+
+/// Reads the headers of the images of one list, each image once.
+pub(super) fn resolve(
+    list: Vec<Sought>,
+    allow_damaged: bool,
+    notes: &mut Notes,
+) -> Result<Vec<ResolvedFrame>> {
     let mut seen = HashSet::new();
-    let mut paths = Vec::new();
-    for mut entry in listing.frames {
-        entry.split = split.or(entry.split);
-        let path = frames::find(root, &entry.file_path, &entry.label, notes);
-        let identity = path.as_deref().map(canonical);
-        if identity.is_some_and(|identity| !seen.insert(identity)) {
+    let mut distinct = Vec::new();
+    for sought in list {
+        if sought.path().map(canonical).is_some_and(|identity| !seen.insert(identity)) {
             let message = "the image is listed more than once; the first entry counts";
-            notes.frame(Severity::Warning, &entry.label, message);
+            notes.frame(Severity::Warning, &sought.entry.label, message);
         } else {
-            paths.push((entry, path));
+            distinct.push(sought);
         }
     }
-    let inspect = |(entry, path): (FrameEntry, Option<PathBuf>)| {
-        let header = path.as_deref().map(Header::read).transpose();
-        match header.with_context(|| entry.label.clone()) {
-            Ok(header) => Ok(ResolvedFrame { entry, found: path.zip(header), damage: None }),
+    let inspect = |sought: Sought| {
+        let header = sought.path().map(Header::read).transpose();
+        match header.with_context(|| sought.entry.label.clone()) {
+            Ok(header) => Ok(ResolvedFrame { sought, header, damage: None }),
             Err(error) if allow_damaged => {
-                Ok(ResolvedFrame { entry, found: None, damage: Some(format!("{error:#}")) })
+                Ok(ResolvedFrame { sought, header: None, damage: Some(format!("{error:#}")) })
             }
             Err(error) => Err(error),
         }
     };
-    paths.into_par_iter().map(inspect).collect()
-}
-
-fn canonical(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+    distinct.into_par_iter().map(inspect).collect()
 }
 
 impl Present {
     /// Sets missing and damaged frames aside.
     pub(super) fn new(
         resolved: Vec<ResolvedFrame>,
-        root: &Path,
+        search: &mut Search,
         options: &OpenOptions,
         notes: &mut Notes,
     ) -> Result<Self> {
         let listed = resolved.len();
-        let names = |holds: fn(&ResolvedFrame) -> bool| -> Vec<String> {
-            resolved.iter().filter(|frame| holds(frame)).map(|frame| frame.entry.file_path.clone()).collect()
-        };
-        let missing = names(|frame| frame.found.is_none());
-        let nowhere = names(|frame| frame.found.is_none() && frame.damage.is_none());
+        let unread = resolved.iter().filter(|frame| frame.header.is_none());
+        let missing: Vec<_> = unread.map(|frame| frame.sought.entry.file_path.clone()).collect();
         let damaged = resolved.iter().filter_map(|frame| frame.damage.clone()).collect();
+        let nowhere: Vec<&Sought> =
+            resolved.iter().map(|frame| &frame.sought).filter(|sought| sought.path().is_none()).collect();
         if !nowhere.is_empty() {
-            let message = format!(
-                "{} of {listed} listed images are missing in {}: {}",
-                nowhere.len(),
-                root.display(),
-                few(&nowhere)
-            );
+            let message = photo_files::missing(&nowhere, listed, search.root);
             if nowhere.len() < listed {
                 notes.warn(format!("{message}; they are skipped"));
             } else {
-                let remedy = format!("put the images where `file_path` says, as {FORMATS}");
-                ensure!(options.allow_missing, "{message}; {remedy}");
+                let message = format!("{message}; {}", photo_files::remedy(&nowhere, search));
+                ensure!(options.allow_missing, message);
+                notes.error(message);
             }
         }
         let is_any_found = missing.len() < listed;
-        let resolved = resolved.into_iter().filter(|frame| frame.found.is_some() || !is_any_found).collect();
+        let resolved = resolved.into_iter().filter(|frame| frame.header.is_some() || !is_any_found).collect();
         Ok(Self { listed, missing, resolved, damaged })
     }
 
     /// The depth of the finest images; display-referred and linear ones do not mix.
     pub(super) fn bit_depth(&self, notes: &mut Notes) -> Result<BitDepth> {
-        let found = || self.resolved.iter().filter_map(|frame| frame.found.as_ref());
+        let found = || self.resolved.iter().filter_map(|frame| frame.sought.path().zip(frame.header));
         let first = |bits: BitDepth| found().find(|(_, header)| header.bits == bits);
         let finest = found().map(|(_, header)| header.bits).max().unwrap_or(BitDepth::Eight);
         let coarsest = found().map(|(_, header)| header.bits).min().unwrap_or(BitDepth::Eight);
@@ -148,14 +143,17 @@ impl Present {
     }
 
     /// Frames with cameras at the size of their photos, and what the splits need to know.
-    pub(super) fn build(self, root: &Path, options: &OpenOptions, notes: &mut Notes) -> Result<Built> {
+    pub(super) fn build(self, search: Search, options: &OpenOptions, notes: &mut Notes) -> Result<Built> {
         let reading = &options.reading;
         let mut damaged = self.damaged;
-        let mut finder = Finder::new(root);
-        let is_any_found = self.resolved.iter().any(|frame| frame.found.is_some());
+        let photos = self.resolved.iter().filter_map(|frame| frame.sought.path().map(Path::to_owned));
+        let mut finder = Finder::new(search, photos.collect());
+        let is_any_found = self.resolved.iter().any(|frame| frame.header.is_some());
         let mut members = Vec::new();
         let mut frames = Vec::new();
-        for ResolvedFrame { entry, found, .. } in self.resolved {
+        for ResolvedFrame { sought, header, .. } in self.resolved {
+            let found = sought.path().map(Path::to_owned).zip(header);
+            let entry = sought.entry;
             let frame = match found {
                 Some((path, header)) => {
                     let mut sidecars = finder.find(&entry, &path, notes);
@@ -172,6 +170,7 @@ impl Present {
             frames.push(frame);
         }
         mask::find_channels(&mut frames, options.allow_missing, notes)?;
+        finder.tell_guesses(notes);
         remark_on_masks(&frames, &finder, is_any_found && reading.invert_masks, notes);
         Ok(Built { frames, members, damaged })
     }

@@ -11,17 +11,19 @@
 //!
 //! A photo may have several; a pixel that one of them ignores is ignored.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
-use super::frames;
+use super::file_names::with_extensions;
+use super::guesses::Guesses;
 use super::json::Fields;
 use super::listing::{DepthEntry, FrameEntry};
 use super::mask::{Ignores, Mask};
 use super::notes::Notes;
+use super::search::{Found, Role, Search};
 use crate::capture::diagnostics::Severity;
 use crate::capture::image_file::Header;
 use crate::photo::BitDepth;
@@ -73,32 +75,54 @@ pub(super) fn listed(frame: Fields, file: Fields) -> Result<(Option<String>, Opt
     Ok((name("mask_path")?, depth))
 }
 
-/// Looks for the files beside photos; reads every folder once.
+/// Looks for the files beside photos.
 pub(super) struct Finder<'a> {
-    root: &'a Path,
-    folders: HashMap<PathBuf, HashSet<OsString>>,
+    search: Search<'a>,
+    /// Files that are photos, and so nothing beside one.
+    photos: HashSet<PathBuf>,
+    masks: Guesses,
+    depths: Guesses,
     /// A folder `masks` and the first photo that has none in it.
     unmatched: Option<(PathBuf, PathBuf)>,
 }
 
 impl<'a> Finder<'a> {
-    /// For the dataset in the folder `root`.
-    pub(super) fn new(root: &'a Path) -> Self {
-        Self { root, folders: HashMap::new(), unmatched: None }
+    /// For a dataset with these photos.
+    pub(super) fn new(search: Search<'a>, photos: HashSet<PathBuf>) -> Self {
+        Self { search, photos, masks: Guesses::default(), depths: Guesses::default(), unmatched: None }
+    }
+
+    /// The file that a frame lists beside its photo; `missing` is said where there is none.
+    fn listed(
+        &mut self,
+        (name, role): (&str, Role),
+        missing: &str,
+        entry: &FrameEntry,
+        notes: &mut Notes,
+    ) -> Option<PathBuf> {
+        let photos = &self.photos;
+        match self.search.find(name, role, &|path| !photos.contains(path)) {
+            Found::One(path, way) => {
+                let guesses = if role == Role::Mask { &mut self.masks } else { &mut self.depths };
+                guesses.add(name, &path, way, self.search.root);
+                return Some(path);
+            }
+            Found::Several(_) => {
+                let message = format!("{missing}, and several files are called like it");
+                notes.frame(Severity::Warning, &entry.label, message);
+            }
+            Found::Shared(_) | Found::Nothing => notes.frame(Severity::Warning, &entry.label, missing),
+        }
+        None
     }
 
     /// The files beside the photo of `entry`, which was found at `image`.
     pub(super) fn find(&mut self, entry: &FrameEntry, image: &Path, notes: &mut Notes) -> Sidecars {
         let mut masks = Vec::new();
         if let Some(listed) = &entry.mask_path {
-            match frames::locate(self.root, listed) {
-                Some((path, _)) => masks.push(Mask::new(path, Ignores::Black)),
-                None => notes.frame(
-                    Severity::Warning,
-                    &entry.label,
-                    "the mask that `mask_path` names is missing; the frame is used without it",
-                ),
-            }
+            let missing = "the frame is used without a mask: the one that `mask_path` names is missing";
+            let found = self.listed((listed, Role::Mask), missing, entry, notes);
+            masks.extend(found.map(|path| Mask::new(path, Ignores::Black)));
         }
         let in_folder = self.in_masks_folder(image);
         masks.extend(in_folder.map(|path| Mask::new(path, Ignores::Black)));
@@ -113,8 +137,8 @@ impl<'a> Finder<'a> {
     /// `masks/<name>` beside one of the folders that the image is in or in the dataset's; the name with or
     /// without the images' folder, with any extension in place of the image's or after it.
     fn in_masks_folder(&mut self, image: &Path) -> Option<PathBuf> {
-        let is_below_root = image.starts_with(self.root);
-        let root = self.root;
+        let is_below_root = image.starts_with(self.search.root);
+        let root = self.search.root;
         let own = image.parent()?;
         for folder in image.ancestors().skip(1) {
             let is_last = folder == root || (!is_below_root && Some(folder) == own.parent());
@@ -128,7 +152,7 @@ impl<'a> Finder<'a> {
                 // `0001.jpg`, `0001.jpg.png`, then `0001.png`.
                 let mut spellings = beside.flat_map(|path| {
                     let stem = path.with_extension("");
-                    frames::candidates(&path).chain(frames::candidates(&stem).skip(1))
+                    with_extensions(&path).chain(with_extensions(&stem).skip(1))
                 });
                 let found = spellings.find(|path| path != image && self.is_there(path));
                 if found.is_some() {
@@ -170,12 +194,9 @@ impl<'a> Finder<'a> {
         [long, short].into_iter().find(|path| self.is_there(path))
     }
 
-    fn depth(&self, entry: &FrameEntry, notes: &mut Notes) -> Option<Depth> {
+    fn depth(&mut self, entry: &FrameEntry, notes: &mut Notes) -> Option<Depth> {
         let listed = entry.depth.as_ref()?;
-        let Some((path, _)) = frames::locate(self.root, &listed.path) else {
-            notes.frame(Severity::Warning, &entry.label, "its depth file is missing");
-            return None;
-        };
+        let path = self.listed((&listed.path, Role::Depth), "its depth file is missing", entry, notes)?;
         // A header that cannot be read is one of a TIFF with a single channel of floats, or comes up on loading.
         let counts_steps = || Header::read(&path).is_ok_and(|header| header.bits != BitDepth::Float);
         if listed.world_per_unit.is_none() && counts_steps() {
@@ -188,13 +209,13 @@ impl<'a> Finder<'a> {
     }
 
     fn is_there(&mut self, path: &Path) -> bool {
-        let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return false };
-        if !self.folders.contains_key(folder) {
-            let shown = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-            let entries = std::fs::read_dir(shown).into_iter().flatten().flatten();
-            self.folders.insert(folder.to_owned(), entries.map(|entry| entry.file_name()).collect());
-        }
-        self.folders.get(folder).is_some_and(|names| names.contains(name))
+        self.search.folders.has(path)
+    }
+
+    /// Says which listed files were not where they are listed.
+    pub(super) fn tell_guesses(&self, notes: &mut Notes) {
+        self.masks.tell("masks", "mask_path", notes);
+        self.depths.tell("depth files", "depth_file_path", notes);
     }
 }
 

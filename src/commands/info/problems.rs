@@ -14,9 +14,7 @@ pub(super) fn found(dataset: &Dataset) -> usize {
 pub(super) fn of_dataset(dataset: &Dataset) -> Vec<Diagnostic> {
     let mut problems = Vec::new();
     problems.extend(dataset.damaged.iter().map(Diagnostic::error));
-    if found(dataset) == 0 && problems.is_empty() {
-        problems.push(Diagnostic::error(nothing_found(dataset)));
-    } else if found(dataset) > 0 && dataset.train.is_empty() {
+    if found(dataset) > 0 && dataset.train.is_empty() {
         problems.push(Diagnostic::error(
             "there is no frame to train on: every frame is in the test or validation split; name the folder or the \
              file that lists the training frames",
@@ -32,15 +30,4 @@ pub(super) fn of_memory(estimate: &Estimate) -> Vec<Diagnostic> {
                    default settings; see `nerf adapters`";
     let excess = estimate.excess.iter().map(|error| Diagnostic::error(with_flags(error)));
     excess.chain(estimate.adapter.is_none().then(|| Diagnostic::note(assumed))).collect()
-}
-
-fn nothing_found(dataset: &Dataset) -> String {
-    let few: Vec<_> = dataset.missing.iter().take(3).map(String::as_str).collect();
-    let more = if dataset.missing.len() > few.len() { ", …" } else { "" };
-    format!(
-        "none of the {} listed images is there: {}{more} in {}; put the images where `file_path` says",
-        dataset.listed,
-        few.join(", "),
-        dataset.root.display()
-    )
 }
