@@ -159,6 +159,12 @@ pub(crate) struct Render {
     /// Only frames A to B - 1, counted from 0
     #[arg(long, value_name = "A..B", value_parser = frames)]
     pub(crate) frames: Option<(usize, usize)>,
+    /// Replace the frames in DIR; those of the same rendering stay where they are not rendered again
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    /// Go on with the frames in DIR, which must be of the same rendering; also while others do so with other --frames
+    #[arg(long, conflicts_with = "overwrite")]
+    pub(crate) skip_existing: bool,
     /// What to put behind the PNG files: transparent, black, white or r,g,b in 0..1
     #[arg(long, value_name = "COLOR", default_value = "transparent", value_parser = picture_background)]
     pub(crate) background: PictureBackground,

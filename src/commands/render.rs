@@ -1,9 +1,12 @@
 //! `nerf render`: a trained field seen from any cameras.
 
-use super::{Session, writable_folder};
+mod frame_folder;
+
+use super::Session;
 use crate::cli::{Format, PictureBackground, Render};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
+use frame_folder::{Earlier, FrameFolder};
 use nerf::camera::Bounds;
 use nerf::camera::{Camera, LensKind};
 use nerf::capture::dataset::read_cameras;
@@ -11,10 +14,12 @@ use nerf::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8
 use nerf::field::renderer::{Renderer, View};
 use nerf::photo::color_space::{ColorSpace, depth_srgb8, opaque_srgb8};
 use nerf::run::TrainedField;
-use nerf::support::file::write_json;
-use nerf::support::format::count;
+use nerf::support::file::{available_bytes, first_within};
+use nerf::support::format::{bytes, count};
 use serde_json::{Map, Value, json};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::panic::resume_unwind;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::thread;
 use std::time::Instant;
@@ -35,31 +40,94 @@ struct Writer<'a> {
     color_space: ColorSpace,
     /// Depths that are white and black in depth pictures, in world units.
     depth_range: [f64; 2],
+    folder: FrameFolder,
 }
 
 pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     let field = session.load_field(&args.run)?;
-    let jobs = jobs(args, &field)?;
-    writable_folder(&args.out)?;
-    let gpu = session.open_gpu()?;
-    let lenses = LensKind::among(jobs.iter().map(|job| &job.camera));
-    let mut renderer = field.renderer(&gpu, &lenses)?;
-    let depth_range = depth_range(&field.metadata().bounds, &jobs);
-    let writer = Writer { args, color_space: field.color_space(), depth_range };
-    let progress = Progress::new(session.console, "rendering");
-    let (frames, seconds) = render_and_write(&mut renderer, &jobs, &writer, &progress)?;
-    drop(progress);
-    let mut listing =
-        json!({ "checkpoint": field.path.display().to_string(), "step": field.metadata().step });
-    if args.depth {
-        listing["depth_near"] = json!(depth_range[0]);
-        listing["depth_far"] = json!(depth_range[1]);
+    let mut jobs = jobs(args, &field)?;
+    let range = depth_range(&field.metadata().bounds, &jobs);
+    let rendering = rendering(args, &field, &jobs, range);
+    select(args, &mut jobs)?;
+    apart_from_photos(args, &jobs)?;
+    let (folder, kept) = FrameFolder::take(&args.out, rendering, earlier(args))?;
+    if folder.is_unguarded() {
+        let out = args.out.display();
+        session.console.warn(&format!(
+            "the file system of {out} has no locks: let only one process at a time render to it"
+        ));
     }
-    listing["frames"] = Value::Array(frames);
-    write_json(&args.out.join("frames.json"), &listing)?;
-    let out = args.out.display().to_string();
-    let result = json!({ "out": out, "frames": jobs.len(), "seconds": seconds });
-    session.print(&result, &format!("{} in {out}", count(jobs.len(), "frame")))
+    let all = jobs.len();
+    jobs.retain(|job| args.overwrite || !kept.contains(&(job.index as u64)));
+    let mut seconds = Vec::new();
+    if !jobs.is_empty() {
+        warn_of_full_disk(args, &jobs, session);
+        let gpu = session.open_gpu()?;
+        let lenses = LensKind::among(jobs.iter().map(|job| &job.camera));
+        let mut renderer = field.renderer(&gpu, &lenses)?;
+        let writer = Writer { args, color_space: field.color_space(), depth_range: range, folder };
+        let progress = Progress::new(session.console, "rendering");
+        seconds = render_and_write(&mut renderer, &jobs, writer, &progress)?;
+    }
+    let (out, skipped) = (args.out.display().to_string(), all - jobs.len());
+    let result = json!({ "out": out, "frames": jobs.len(), "skipped": skipped, "seconds": seconds });
+    let were_there = if skipped > 0 { format!(", {skipped} were there already") } else { String::new() };
+    session.print(&result, &format!("{} in {out}{were_there}", count(jobs.len(), "frame")))
+}
+
+fn earlier(args: &Render) -> Earlier {
+    match (args.overwrite, args.skip_existing) {
+        (true, _) => Earlier::Replaced,
+        (_, true) => Earlier::Kept,
+        _ => Earlier::Refused,
+    }
+}
+
+/// What all frames of a path have in common, whichever of them are rendered.
+fn rendering(args: &Render, field: &TrainedField, path: &[Job], depth_range: [f64; 2]) -> Map<String, Value> {
+    let mut listing = Map::new();
+    let mut set = |key: &str, value: Value| listing.insert(key.to_owned(), value);
+    set("checkpoint", json!(field.path.display().to_string()));
+    set("step", json!(field.metadata().step));
+    if args.depth {
+        set("depth_near", json!(depth_range[0]));
+        set("depth_far", json!(depth_range[1]));
+    }
+    set("field", json!(field.identity()));
+    let mut hasher = DefaultHasher::new();
+    path.iter().for_each(|job| format!("{:?}", job.camera).hash(&mut hasher));
+    set("cameras", json!(format!("{:016x}", hasher.finish())));
+    let has = |format| args.format.contains(&format);
+    let background = match args.background {
+        PictureBackground::Transparent => json!("transparent"),
+        PictureBackground::Color(color) => json!(color),
+    };
+    let settings = json!({
+        "png": has(Format::Png),
+        "exr": has(Format::Exr),
+        "half": args.half,
+        "depth": args.depth,
+        "background": background,
+    });
+    set("settings", settings);
+    listing
+}
+
+/// Warns where the frames may not fit on the disk; how well they compress is not known.
+fn warn_of_full_disk(args: &Render, jobs: &[Job], session: &Session<'_>) {
+    let has = |format| u64::from(args.format.contains(&format));
+    let exr = if args.half { 12 } else { 20 };
+    let per_pixel = 4 * has(Format::Png) + exr * has(Format::Exr) + 4 * u64::from(args.depth);
+    let pixels: u64 = jobs.iter().map(|job| u64::from(job.camera.width) * u64::from(job.camera.height)).sum();
+    if let Some(available) = available_bytes(&args.out).filter(|&available| available < pixels * per_pixel) {
+        session.console.warn(&format!(
+            "the frames take up to {}, and the file system of {} has {} left; should that not do, make room and go on \
+             with --skip-existing",
+            bytes(pixels * per_pixel),
+            args.out.display(),
+            bytes(available)
+        ));
+    }
 }
 
 /// Renders the jobs in order, describes their files, and returns the seconds that each took to render. A thread writes those
@@ -67,13 +135,17 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
 fn render_and_write(
     renderer: &mut Renderer,
     jobs: &[Job],
-    writer: &Writer<'_>,
+    mut writer: Writer<'_>,
     progress: &Progress,
-) -> Result<(Vec<Value>, Vec<f64>)> {
+) -> Result<Vec<f64>> {
     thread::scope(|scope| {
         // Without room in between: the next view waits until the last one is written.
         let (sender, views) = mpsc::sync_channel::<(&Job, View)>(0);
-        let writing = scope.spawn(move || views.iter().map(|(job, view)| writer.write(job, &view)).collect());
+        let writing = scope.spawn(move || {
+            let written = views.iter().try_for_each(|(job, view)| writer.write(job, &view));
+            let listed = writer.folder.flush();
+            written.and(listed)
+        });
         let mut render = || -> Result<Vec<f64>> {
             let mut seconds = Vec::with_capacity(jobs.len());
             for (number, job) in jobs.iter().enumerate() {
@@ -90,12 +162,12 @@ fn render_and_write(
         };
         let rendered = render();
         drop(sender);
-        let written: Result<Vec<Value>> = writing.join().unwrap_or_else(|panic| resume_unwind(panic));
-        let frames = written?;
-        rendered.map(|seconds| (frames, seconds))
+        writing.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+        rendered
     })
 }
 
+/// All cameras of the path.
 fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
     let metadata = field.metadata();
     let [width, height] = metadata.image_size;
@@ -111,18 +183,24 @@ fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
             named.map(|(index, camera)| (format!("orbit {index}"), camera)).collect()
         }
     };
-    let (first, end) = args.frames.unwrap_or((0, cameras.len()));
-    ensure!(
-        end <= cameras.len() && first < end,
-        "--frames expects a range within 0..{}, found {first}..{end}",
-        cameras.len()
-    );
     let job = |(index, (source, camera)): (usize, (String, Camera))| {
         let camera = resized(camera, args.width, args.height);
         Job { index, source, camera }
     };
-    let jobs: Vec<Job> = cameras.into_iter().enumerate().take(end).skip(first).map(job).collect();
-    for Job { source, camera, .. } in &jobs {
+    Ok(cameras.into_iter().enumerate().map(job).collect())
+}
+
+/// Leaves the frames that are to be rendered.
+fn select(args: &Render, jobs: &mut Vec<Job>) -> Result<()> {
+    let (first, end) = args.frames.unwrap_or((0, jobs.len()));
+    ensure!(
+        end <= jobs.len() && first < end,
+        "--frames expects a range within 0..{}, found {first}..{end}",
+        jobs.len()
+    );
+    jobs.truncate(end);
+    jobs.drain(..first);
+    for Job { source, camera, .. } in jobs {
         ensure!(
             camera.width.max(camera.height) <= MOST_PIXELS,
             "the camera of {source} has {}x{} pixels, and at most {MOST_PIXELS} a side are rendered; say --width",
@@ -130,7 +208,25 @@ fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
             camera.height
         );
     }
-    Ok(jobs)
+    Ok(())
+}
+
+/// Frames must not lie among the photos that the cameras took, which have such names.
+fn apart_from_photos(args: &Render, jobs: &[Job]) -> Result<()> {
+    let Some(file) = &args.path.cameras else { return Ok(()) };
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let photos = jobs.iter().flat_map(|job| {
+        let photo = folder.join(&job.source);
+        ["", ".png", ".jpg", ".jpeg", ".exr"].map(|end| PathBuf::from(format!("{}{end}", photo.display())))
+    });
+    let found = first_within(&args.out, photos);
+    ensure!(
+        found.is_none(),
+        "the folder {} holds photos of the cameras ({}), which frames could replace; name another folder",
+        args.out.display(),
+        found.unwrap_or_default().display()
+    );
+    Ok(())
 }
 
 /// The camera at the size asked for; a side that is not given follows.
@@ -156,8 +252,8 @@ fn depth_range(bounds: &Bounds, jobs: &[Job]) -> [f64; 2] {
 }
 
 impl Writer<'_> {
-    /// Writes the files of a view and describes them.
-    fn write(&self, job: &Job, view: &View) -> Result<Value> {
+    /// Writes the files of a view and lists them.
+    fn write(&mut self, job: &Job, view: &View) -> Result<()> {
         let (stem, args) = (format!("{:04}", job.index), self.args);
         let mut files = Map::new();
         if args.format.contains(&Format::Png) {
@@ -179,13 +275,14 @@ impl Writer<'_> {
             let pixels = depth_srgb8(&view.depth, &view.color, self.depth_range.map(|z| z as f32));
             files.insert("depth".to_owned(), self.write_png(format!("{stem}_depth.png"), view, &pixels)?);
         }
-        Ok(json!({
+        let frame = json!({
             "index": job.index,
             "source": job.source,
             "width": view.width,
             "height": view.height,
             "files": files,
-        }))
+        });
+        self.folder.add(job.index, frame)
     }
 
     fn write_png(&self, file: String, view: &View, pixels: &[[u8; 4]]) -> Result<Value> {

@@ -3,11 +3,13 @@
 use crate::camera::LensKind;
 use crate::field::Field;
 use crate::field::checkpoint::{self, Checkpoint, Metadata};
+use crate::field::parameters::Numbers;
 use crate::field::renderer::Renderer;
 use crate::gpu::Gpu;
 use crate::photo::color_space::ColorSpace;
 use anyhow::Result;
 use std::collections::BTreeSet;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -33,6 +35,22 @@ impl TrainedField {
     #[must_use]
     pub fn metadata(&self) -> &Metadata {
         &self.checkpoint.metadata
+    }
+
+    /// A text that tells fields apart by what they render, however their files are called.
+    #[must_use]
+    pub fn identity(&self) -> String {
+        let Checkpoint { metadata: Metadata { config, bounds, features, .. }, state } = &self.checkpoint;
+        let mut hasher = DefaultHasher::new();
+        format!("{config:?} {bounds:?} {features:?}").hash(&mut hasher);
+        for (name, numbers) in &state.arrays {
+            name.hash(&mut hasher);
+            match numbers {
+                Numbers::Floats(numbers) => hasher.write(bytemuck::cast_slice(numbers)),
+                Numbers::Words(numbers) => hasher.write(bytemuck::cast_slice(numbers)),
+            }
+        }
+        format!("{:016x}", hasher.finish())
     }
 
     /// The colour space of what it renders.

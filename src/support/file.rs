@@ -1,8 +1,9 @@
 //! Writing files so that a crash never leaves half of one.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::temporary::{remove_leftovers, temporary_in};
 use anyhow::{Context, Result};
@@ -49,6 +50,27 @@ pub fn writable_folder(path: &Path) -> Result<()> {
     temporary_in(path).with_context(|| format!("the folder {show} cannot be written to"))?;
     remove_leftovers(path);
     Ok(())
+}
+
+/// Bytes that can still be written to a folder's file system; `None` where the system does not say.
+#[must_use]
+pub fn available_bytes(folder: &Path) -> Option<u64> {
+    fs4::statvfs(folder).ok().filter(|stats| stats.total_space() > 0).map(|stats| stats.available_space())
+}
+
+/// The first of some files that are there and lie in `folder` itself, whichever way folder and files are spelled or linked.
+pub fn first_within(folder: &Path, files: impl IntoIterator<Item = PathBuf>) -> Option<PathBuf> {
+    let folder = folder.canonicalize().ok()?;
+    let mut is_within = HashMap::new();
+    files.into_iter().find(|file| {
+        let parent = file.parent().unwrap_or(Path::new("")).to_owned();
+        let by_name =
+            |parent: &PathBuf| Path::new(".").join(parent).canonicalize().is_ok_and(|it| it == folder);
+        let there = *is_within.entry(parent).or_insert_with_key(by_name);
+        // A link elsewhere to a file in the folder.
+        let linked = || file.is_symlink() && file.canonicalize().is_ok_and(|it| it.parent() == Some(&folder));
+        (there || linked()) && file.exists()
+    })
 }
 
 #[cfg(test)]
