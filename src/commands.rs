@@ -19,7 +19,6 @@ use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::field::checkpoint::Metadata;
 use nerf::gpu::{Gpu, adapter};
 use nerf::run::TrainedField;
-use nerf::support::file::writable_folder;
 use nerf::support::format::count;
 use serde_json::Value;
 use std::io::Write;

@@ -152,6 +152,17 @@ impl Dataset {
         (found, missing)
     }
 
+    /// The files that it is read from: its own, photos, masks, alpha and depth.
+    pub fn input_files<'a>(&'a self) -> impl Iterator<Item = &'a PathBuf> {
+        let of_frame = |frame: &'a Frame| {
+            let sidecars = &frame.source.sidecars;
+            let depth = sidecars.depth.as_ref().map(|depth| &depth.path);
+            let masks = sidecars.masks.iter().map(|mask| &mask.path);
+            [Some(&frame.path), sidecars.alpha.as_ref(), depth].into_iter().flatten().chain(masks)
+        };
+        self.files.iter().chain(self.frames.iter().flat_map(of_frame))
+    }
+
     /// Indices of the frames, each image once: splits may share images.
     pub(crate) fn distinct_images(&self) -> Vec<usize> {
         let mut seen = HashSet::new();

@@ -1,6 +1,8 @@
 //! `nerf eval`: PSNR and SSIM against photos.
 
-use super::{Session, open_to_compare, writable_folder};
+mod pictures;
+
+use super::{Session, open_to_compare};
 use crate::cli::Eval;
 use crate::score_summary::describe_near;
 use anyhow::{Context, Result, ensure};
@@ -12,6 +14,7 @@ use nerf::photo::color_space::{ColorSpace, opaque_srgb8};
 use nerf::run::{Compared, Evaluator, Means, Score, TrainedField};
 use nerf::support::format::{count, few};
 use serde_json::{Value, json};
+use std::path::PathBuf;
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     let field = session.load_field(&args.run)?;
@@ -24,14 +27,15 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
         args.dataset.display(),
         range(dataset.is_hdr)
     );
-    if let Some(folder) = &args.save {
-        writable_folder(folder)?;
-    }
+    let pictures = match &args.save {
+        Some(folder) => pictures::paths(folder, &dataset, &indices)?,
+        None => Vec::new(),
+    };
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
     let mut evaluator = Evaluator::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);
     evaluator.background = args.background.color();
-    let scores = measure(evaluator, &indices, args, session)?;
+    let scores = measure(evaluator, &indices, &pictures, session)?;
     let means = Means::of(&scores).context("there was nothing to measure")?;
     session.console.fog(means.near_share);
     session.print(&report(args, &field, &scores, means), &describe(args, &scores, means, field.color_space()))
@@ -40,16 +44,15 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
 fn measure(
     mut evaluator: Evaluator<'_>,
     indices: &[usize],
-    args: &Eval,
+    pictures: &[PathBuf],
     session: &Session<'_>,
 ) -> Result<Vec<Score>> {
     let mut scores = Vec::with_capacity(indices.len());
-    evaluator.each(indices, None, &mut session.narrator(), |_, compared| {
+    evaluator.each(indices, None, &mut session.narrator(), |position, compared| {
         let Compared { mut score, size: [width, height], rendered, .. } = compared;
-        if let Some(folder) = &args.save {
-            let file = format!("{:04}.png", scores.len());
-            write_png_rgba8(&folder.join(&file), width, height, &opaque_srgb8(&rendered))?;
-            score.saved = Some(file);
+        if let Some(picture) = pictures.get(position) {
+            write_png_rgba8(picture, width, height, &opaque_srgb8(&rendered))?;
+            score.saved = picture.file_name().map(|name| name.to_string_lossy().into_owned());
         }
         scores.push(score);
         Ok(())

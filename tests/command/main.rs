@@ -7,6 +7,7 @@ mod check;
 mod cli;
 mod info;
 mod program;
+mod render;
 mod report;
 mod scores;
 mod sidecars;

@@ -16,7 +16,7 @@ fn photos_are_measured_as_they_were_trained_on() {
         let out = place("small_views");
         let args = ["eval", text(&run), text(&TOYS), "--save", text(&out)];
         let psnr = number(&object(&[&args, further].concat())["psnr"]);
-        (Image::load(&out.join("0000.png")).expect("a view").size(), psnr)
+        (Image::load(&out.join("test_0000.png")).expect("a view").size(), psnr)
     };
     let (size, before) = measured(&[]);
     assert_eq!(size, [small; 2]);
