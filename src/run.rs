@@ -9,6 +9,7 @@
 
 mod clock;
 pub mod depths;
+mod disk;
 mod estimate;
 mod evaluate;
 mod event;

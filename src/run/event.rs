@@ -6,7 +6,7 @@ use super::stepper::Block;
 use crate::field::Plan;
 use crate::field::checkpoint::Metadata;
 use crate::gpu::Gpu;
-use crate::support::format::{count, few};
+use crate::support::format::{bytes, count, few};
 use std::fmt;
 use std::path::Path;
 
@@ -115,6 +115,30 @@ pub enum Warning<'a> {
         /// The folder.
         folder: &'a Path,
     },
+    /// The file system has hardly room for what is to be saved.
+    LittleRoom {
+        /// Bytes that checkpoints take at most.
+        needed: u64,
+        /// Bytes that are left.
+        available: u64,
+        /// The run's folder.
+        folder: &'a Path,
+    },
+    /// A checkpoint could not be written.
+    NotSaved {
+        /// When, what is kept, and why.
+        reason: &'a str,
+    },
+    /// The log could not be written.
+    NotLogged {
+        /// Why.
+        reason: &'a str,
+    },
+    /// The run's folder was removed, and is made again.
+    FolderRemoved {
+        /// The folder.
+        folder: &'a Path,
+    },
     /// The rays of the last steps had no samples.
     Empty {
         /// Steps taken.
@@ -149,6 +173,30 @@ impl fmt::Display for Warning<'_> {
                 "the file system of {} has no locks, so nothing keeps another training out of this folder",
                 folder.display()
             ),
+            Self::LittleRoom { needed, available, folder } => write!(
+                f,
+                "checkpoints take up to {}, and the file system of {} has {} left; where that does not do, saving fails, \
+                 which is said and tried again",
+                bytes(*needed),
+                folder.display(),
+                bytes(*available)
+            ),
+            Self::NotSaved { reason } => {
+                write!(f, "could not save {reason}; training is not lost by it, and saving is tried again")
+            }
+            Self::NotLogged { reason } => {
+                write!(
+                    f,
+                    "could not log ({reason}); training goes on, and the rows are kept until they can be written"
+                )
+            }
+            Self::FolderRemoved { folder } => {
+                write!(
+                    f,
+                    "the folder {} was removed; it is made again, and saved to at once",
+                    folder.display()
+                )
+            }
             Self::Empty { step } => write!(
                 f,
                 "at step {step} the rays meet nothing any more, the field has become empty; try a smaller \

@@ -132,6 +132,20 @@ impl RunFolder {
         fs::read_to_string(self.path.join(Self::CONFIG)).ok()
     }
 
+    /// Makes the folder again where it was removed, with the configuration; whether it was.
+    ///
+    /// # Errors
+    /// When it cannot be made, or another process trains into one of that name.
+    pub fn make_again(&mut self, config: &Config) -> Result<bool> {
+        if self.lock.as_ref().is_none_or(FolderLock::is_in_place) {
+            return Ok(false);
+        }
+        let lock = FolderLock::alone(&self.path)?;
+        write_json(&self.path.join(Self::CONFIG), config)?;
+        self.lock = Some(lock);
+        Ok(true)
+    }
+
     /// Replaces what an earlier run left, or goes on with it from step `resumed` on; the configuration is written, and
     /// the log open.
     ///
@@ -177,11 +191,15 @@ mod tests {
         drop(run);
         let used = RunFolder::unused(folder.path()).expect_err("an earlier run was there");
         assert!(used.to_string().contains("is not empty"), "{used}");
-        let run = RunFolder::to_overwrite(folder.path()).expect("a folder");
+        let mut run = RunFolder::to_overwrite(folder.path()).expect("a folder");
         run.begin(&Config::default(), None).expect("writable");
         assert!(!run.report().exists() && folder.path().join("notes.txt").exists());
         assert!(run.config().is_some_and(|text| text.contains("\"grid\"")));
         assert_eq!(RunFolder::find(&run.path.join(RunFolder::LOG)).expect("there").path, run.path);
+        fs::remove_dir_all(&run.path).expect("removable");
+        assert!(run.make_again(&Config::default()).expect("writable") && run.config().is_some());
+        assert!(!run.make_again(&Config::default()).expect("writable"), "it is there");
+        fs::write(run.path.join(RunFolder::LOG), "").expect("writable");
         assert!(RunFolder::unused(&run.path.join(RunFolder::LOG)).is_err(), "a file is no folder");
     }
 }

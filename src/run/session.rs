@@ -2,8 +2,10 @@
 //! checkpoints.
 
 mod ending;
+mod saving;
 
 use super::clock::StepClock;
+use super::disk;
 use super::evaluate::Evaluator;
 use super::event::{Event, Observer, StepsTaken, Warning};
 use super::folder::RunFolder;
@@ -19,14 +21,12 @@ use crate::field::checkpoint::Metadata;
 use crate::field::trainer::Trainer;
 use crate::gpu::Gpu;
 use crate::support::metrics::PSNR_CAP_DB;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 pub use ending::NoTestViews;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// Seconds of training between checkpoints.
-const BETWEEN_CHECKPOINTS: f64 = 60.0;
 /// Test views that are measured while training.
 const FEW_VIEWS: usize = 4;
 
@@ -60,6 +60,10 @@ pub struct TrainingSession<'a> {
     start: (u32, f64),
     /// Step and seconds of the newest checkpoint; step 0 when there is none.
     saved: (u32, f64),
+    /// Seconds of training when saving was tried last.
+    tried: f64,
+    /// Whether rows of the log could not be written.
+    is_log_lacking: bool,
     /// The first and the last loss of this session.
     loss: Option<[f64; 2]>,
     is_empty: bool,
@@ -87,13 +91,14 @@ impl<'a> TrainingRun<'a> {
     /// When the memory does not suffice, a photo cannot be read, the adapter refuses a kernel, or the folder cannot be
     /// written to.
     pub fn begin(self, observer: &mut dyn Observer) -> Result<TrainingSession<'a>> {
-        let Self { gpu, dataset, mut resolved, folder, evaluation } = self;
+        let Self { gpu, dataset, mut resolved, mut folder, evaluation } = self;
         let Resolved { metadata, plan, test, .. } = &resolved;
         observer.notice(&Event::Resolved { metadata, plan, gpu: &gpu, test_views: test.len() });
         resolved.check_memory(&gpu, dataset, observer)?;
         if folder.is_unguarded() {
             observer.notice(&Event::Warning(Warning::Unguarded { folder: folder.path() }));
         }
+        disk::check(folder.path(), plan.state_bytes(), observer)?;
         let clock = Instant::now();
         let views = resolved.photos(dataset).load(&gpu, &resolved.plan, observer)?;
         let load_seconds = clock.elapsed().as_secs_f64();
@@ -109,8 +114,9 @@ impl<'a> TrainingRun<'a> {
         };
         let compile_seconds = clock.elapsed().as_secs_f64();
         let Resolved { metadata, plan, test, .. } = resolved;
+        folder.make_again(&metadata.config)?;
         let mut log = folder.begin(&metadata.config, state.map(|state| state.step))?;
-        log.write(&LogRow::Start(log::Start {
+        log.add(&LogRow::Start(log::Start {
             step: metadata.step.into(),
             adapter: Some(metadata.adapter.clone()),
             driver: Some(format!("{} {}", gpu.info.driver, gpu.info.driver_info)),
@@ -118,9 +124,9 @@ impl<'a> TrainingRun<'a> {
             load_seconds: Some(load_seconds),
             compile_seconds: Some(compile_seconds),
         }))?;
+        log.flush()?;
         let stepper = Stepper::new(trainer, StepClock::new(&metadata, log.logged_seconds()));
         let start = (stepper.steps(), stepper.seconds());
-        let (saved, loss, is_empty) = (start, None, false);
         Ok(TrainingSession {
             metadata,
             test,
@@ -130,9 +136,11 @@ impl<'a> TrainingRun<'a> {
             log,
             evaluator,
             start,
-            saved,
-            loss,
-            is_empty,
+            saved: start,
+            tried: start.1,
+            is_log_lacking: false,
+            loss: None,
+            is_empty: false,
         })
     }
 }
@@ -147,8 +155,8 @@ impl TrainingSession<'_> {
     /// Trains until the budget is spent or `stop` is raised, and saves.
     ///
     /// # Errors
-    /// When training diverges, the device was lost, or a file cannot be written. The newest
-    /// checkpoint stays; the message names its step.
+    /// When training diverges, the device was lost, or the checkpoint cannot be written in the end; until then that is a
+    /// [`Warning`]. The newest checkpoint stays; the message names its step.
     pub fn train(&mut self, stop: &AtomicBool, observer: &mut dyn Observer) -> Result<TrainingEnd> {
         while !self.stepper.is_over() && !stop.load(Ordering::Relaxed) {
             let step = self.stepper.steps();
@@ -160,16 +168,14 @@ impl TrainingSession<'_> {
             let block = self.stepper.block(pause).map_err(|error| anyhow!("{error:#}; {}", self.kept()))?;
             self.record(block, observer)?;
             self.evaluate_if_due(observer)?;
-            if self.stepper.seconds() - self.saved.1 >= BETWEEN_CHECKPOINTS {
-                self.save(observer)?;
-            }
+            self.save_if_due(observer)?;
         }
-        self.save(observer)?;
+        self.save_at_end(stop, observer)?;
         let (step, seconds) = (self.stepper.steps(), self.stepper.seconds());
         let stages = self.stepper.stages().per_step();
         if !stages.is_empty() {
             let steps = self.stepper.stages().steps().into();
-            self.log.write(&LogRow::Stages(log::Stages { step: step.into(), steps, stages }))?;
+            self.log(&LogRow::Stages(log::Stages { step: step.into(), steps, stages }), observer)?;
         }
         observer.notice(&Event::Ended);
         let (skipped, interrupted) = (self.stepper.skipped(), !self.stepper.is_over());
@@ -190,7 +196,7 @@ impl TrainingSession<'_> {
         if stats.skipped > 0 && self.stepper.skipped() == stats.skipped {
             observer.notice(&Event::Warning(Warning::Skipped { step, skipped: stats.skipped }));
         }
-        self.log.write(&LogRow::Block(log::Steps {
+        let row = log::Steps {
             step: step.into(),
             seconds: Some(seconds),
             loss: Some(stats.loss),
@@ -200,8 +206,9 @@ impl TrainingSession<'_> {
             marched: Some(stats.marched as f64),
             skipped: stats.skipped.into(),
             learning_rate: Some(clock.learning_rate(step, 0.0)),
-        }))?;
+        };
         let (spent, remaining) = (clock.spent(step), clock.remaining(step, self.start));
+        self.log(&LogRow::Block(row), observer)?;
         observer.notice(&Event::Steps(StepsTaken { step, seconds, block, psnr, spent, remaining }));
         Ok(())
     }
@@ -215,7 +222,7 @@ impl TrainingSession<'_> {
         let clock = Instant::now();
         let Some(means) = evaluator.kept()? else { return Ok(()) };
         observer.notice(&Event::Evaluated { step, means });
-        self.log.write(&LogRow::Evaluation(log::Evaluation {
+        let row = log::Evaluation {
             step: step.into(),
             seconds: Some(self.stepper.seconds()),
             eval_psnr: Some(means.psnr),
@@ -223,25 +230,7 @@ impl TrainingSession<'_> {
             views: means.views as u64,
             near_share: means.near_share,
             ..log::Evaluation::default()
-        }))
-    }
-
-    fn save(&mut self, observer: &mut dyn Observer) -> Result<()> {
-        let step = self.stepper.steps();
-        let seconds = self.stepper.clock().recorded_seconds();
-        let path = self.folder.checkpoint();
-        let saved = self.stepper.trainer().save(&path, Metadata { seconds, ..self.metadata.clone() });
-        saved.with_context(|| format!("at step {step} ({})", self.kept()))?;
-        self.saved = (step, self.stepper.seconds());
-        observer.notice(&Event::Saved { step, path: &path });
-        Ok(())
-    }
-
-    /// The state to resume from.
-    fn kept(&self) -> String {
-        match self.saved.0 {
-            0 => "nothing was saved yet".to_owned(),
-            step => format!("the checkpoint of step {step} is kept"),
-        }
+        };
+        self.log(&LogRow::Evaluation(row), observer)
     }
 }

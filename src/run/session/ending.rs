@@ -48,7 +48,7 @@ impl TrainingSession<'_> {
         let limit = is_limited.then_some(EVALUATION_SHARE * end.seconds);
         let views = TestViews::measure(evaluator, &self.test, limit, observer)?;
         if let Some(summary) = views.summary() {
-            self.log.write(&LogRow::Evaluation(log::Evaluation {
+            let row = log::Evaluation {
                 step: end.step.into(),
                 seconds: Some(end.seconds),
                 eval_psnr: Some(summary.psnr),
@@ -57,7 +57,9 @@ impl TrainingSession<'_> {
                 views: summary.views,
                 views_left_out: Some(summary.left_out),
                 near_share: summary.near_share,
-            }))?;
+            };
+            self.log(&LogRow::Evaluation(row), observer)?;
+            self.save_if_removed(observer)?;
         }
         Ok(Ok(views))
     }
