@@ -1,9 +1,10 @@
 //! Temporary files, which their processes lock, so that others know whose are left behind.
 
+use anyhow::Result;
 use fs4::{FileExt, TryLockError};
 use std::ffi::OsStr;
 use std::fs::File;
-use std::io::{Error, ErrorKind, Result};
+use std::io::{Error, ErrorKind};
 use std::path::Path;
 use tempfile::NamedTempFile;
 
@@ -16,10 +17,8 @@ const NAME: [&str; 2] = [".nerf-", ".part"];
 /// When it cannot be created. The error does not name it, which would say nothing to anybody.
 pub(super) fn temporary_in(folder: &Path) -> Result<NamedTempFile> {
     if !folder.is_dir() {
-        return Err(Error::new(
-            ErrorKind::NotFound,
-            format!("the folder {} does not exist", folder.display()),
-        ));
+        let missing = format!("the folder {} does not exist", folder.display());
+        return Err(Error::new(ErrorKind::NotFound, missing).into());
     }
     let mut builder = tempfile::Builder::new();
     builder.prefix(NAME[0]).suffix(NAME[1]);
@@ -29,7 +28,9 @@ pub(super) fn temporary_in(folder: &Path) -> Result<NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(permissions);
     let reason = |error: Error| {
-        Error::new(error.kind(), format!("cannot create a file in {}: {}", folder.display(), error.kind()))
+        let cause = error.get_ref().and_then(|named| named.source()?.downcast_ref::<Error>()?.raw_os_error());
+        let cause = cause.map_or_else(|| error.kind().into(), Error::from_raw_os_error);
+        anyhow::Error::new(cause).context(format!("cannot create a file in {}", folder.display()))
     };
     loop {
         let temporary = builder.tempfile_in(folder).map_err(reason)?;
