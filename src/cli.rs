@@ -14,12 +14,21 @@ use nerf::photo::Split;
 use one_of::OneOf;
 use std::path::PathBuf;
 
+/// What an exit code says, also to a scheduler.
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    Done
+  1    Failed for good: bad data, or it does not fit
+  2    Usage
+  3    Failed, and may work when it is tried again: disk full or failing, device lost or out of memory, too many open files
+  129  Interrupted by SIGHUP, 130 by SIGINT (Ctrl-C), 143 by SIGTERM; a training is saved first, unless a second signal comes";
+
 /// Train neural radiance fields from posed photos and render new views of them.
 ///
 /// Runs on any GPU with Vulkan, Metal or DX12, and on a CPU through a software driver.
-/// Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 failed, 2 usage.
+/// Results go to stdout, progress and messages to stderr.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true, propagate_version = true)]
+#[command(version, arg_required_else_help = true, propagate_version = true, after_help = EXIT_CODES)]
 pub(crate) struct Cli {
     /// What to do.
     #[command(subcommand)]

@@ -14,6 +14,7 @@ use crate::cli::photo_flags::PhotoFlags;
 use crate::cli::{Cli, Command, Global};
 use crate::console::Console;
 use crate::narrator::Narrator;
+use crate::signals::Signals;
 use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::field::checkpoint::Metadata;
@@ -26,8 +27,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Runs the subcommand.
-pub(crate) fn run(cli: &Cli) -> Result<()> {
-    let session = Session { global: &cli.global, console: Console::new(&cli.global) };
+pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<()> {
+    let session = Session { global: &cli.global, console: Console::new(&cli.global), signals };
     match &cli.command {
         Command::Train(args) => train::run(args, &session),
         Command::Render(args) => render::run(args, &session),
@@ -58,12 +59,14 @@ impl std::error::Error for Failed {}
 struct Session<'a> {
     global: &'a Global,
     console: Console,
+    signals: &'a Signals,
 }
 
 impl Session<'_> {
     /// Opens the adapter asked for.
     fn open_gpu(&self) -> Result<Arc<Gpu>> {
-        let gpu = Gpu::open(&adapter::choose(self.global.adapter.as_deref())?)?;
+        let mut gpu = Gpu::open(&adapter::choose(self.global.adapter.as_deref())?)?;
+        gpu.interrupt = self.signals.interrupt.clone();
         let info = &gpu.info;
         self.console.detail(&format!(
             "adapter {} ({:?}, {:?}, {} {})",
@@ -87,8 +90,21 @@ impl Session<'_> {
         Narrator::new(self.console)
     }
 
+    /// From now on a signal raises the interrupt, also the device's, and waits: there is something to bring to an end. Fails
+    /// where one came before.
+    fn end_gracefully(&self) -> Result<()> {
+        self.signals.end_gracefully();
+        self.check_interrupt()
+    }
+
+    /// Fails where a signal has asked for an end.
+    fn check_interrupt(&self) -> Result<()> {
+        Ok(self.signals.interrupt.check()?)
+    }
+
     /// Prints the result: `json` if asked for, else `text`.
     fn print(&self, json: &Value, text: &str) -> Result<()> {
+        self.signals.claim_answer();
         let mut out = std::io::stdout().lock();
         match self.global.json {
             true => writeln!(out, "{json}")?,

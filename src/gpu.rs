@@ -12,7 +12,10 @@ pub mod source;
 pub mod tensor;
 pub mod timer;
 
-use anyhow::{Context, Result, anyhow};
+use crate::support::interrupt::Interrupt;
+use crate::support::transient::Transient;
+use anyhow::{Context, Result, bail};
+use std::fmt::Display;
 use std::sync::{Arc, Mutex};
 
 /// An open device and what it can do.
@@ -24,7 +27,17 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// Name, driver and kind of the adapter.
     pub info: wgpu::AdapterInfo,
-    error: Arc<Mutex<Option<String>>>,
+    /// Asked by what takes long on it: loading photos, steps, views.
+    pub interrupt: Interrupt,
+    error: Arc<Mutex<Option<DeviceError>>>,
+}
+
+/// What a device reported outside of a call that could return it.
+#[derive(Clone, Debug)]
+struct DeviceError {
+    message: String,
+    /// Whether it may work another time.
+    is_transient: bool,
 }
 
 /// Features that speed training up and are used wherever the adapter has them.
@@ -78,13 +91,21 @@ impl Gpu {
     #[must_use]
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
         let error = Arc::new(Mutex::new(None));
+        let report = |message: String, is_transient: bool, sink: &Mutex<Option<DeviceError>>| {
+            if let Ok(mut first) = sink.lock() {
+                first.get_or_insert(DeviceError { message, is_transient });
+            }
+        };
         let sink = Arc::clone(&error);
         device.on_uncaptured_error(Arc::new(move |failure: wgpu::Error| {
-            if let Ok(mut first) = sink.lock() {
-                first.get_or_insert_with(|| failure.to_string());
-            }
+            let is_transient = matches!(failure, wgpu::Error::OutOfMemory { .. });
+            report(failure.to_string(), is_transient, &sink);
         }));
-        Self { device, queue, info, error }
+        let sink = Arc::clone(&error);
+        device.set_device_lost_callback(move |_, message| {
+            report(format!("the device was lost ({message})"), true, &sink);
+        });
+        Self { device, queue, info, interrupt: Interrupt::default(), error }
     }
 
     /// Whether the adapter runs on the CPU (lavapipe, WARP), where the fast layout is another one.
@@ -107,8 +128,8 @@ impl Gpu {
     }
 
     /// Submits the recorded commands.
-    pub fn submit(&self, encoder: wgpu::CommandEncoder) {
-        self.queue.submit([encoder.finish()]);
+    pub fn submit(&self, encoder: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
+        self.queue.submit([encoder.finish()])
     }
 
     /// Starts recording commands.
@@ -122,18 +143,39 @@ impl Gpu {
     /// # Errors
     /// When the device was lost or a command was invalid; the first driver message is passed on.
     pub fn wait(&self) -> Result<()> {
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|failure| anyhow!("waiting for the adapter '{}': {failure}", self.info.name))?;
-        self.check()
+        self.wait_until(wgpu::PollType::wait_indefinitely())
+    }
+
+    /// Waits until one submission and those before it have run.
+    ///
+    /// # Errors
+    /// As [`Gpu::wait`].
+    pub fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<()> {
+        self.wait_until(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })
+    }
+
+    fn wait_until(&self, end: wgpu::PollType) -> Result<()> {
+        let waited = self.device.poll(end);
+        self.check()?;
+        waited.map(drop).map_err(|failure| self.lost(failure))
     }
 
     /// Reports the first error the device raised outside of a call that could return it.
     ///
     /// # Errors
-    /// That error, with the adapter's name.
+    /// That error, with the adapter's name; [`Transient`] where the device was lost, or its memory was full.
     pub fn check(&self) -> Result<()> {
         let first = self.error.lock().map_or(None, |slot| slot.clone());
-        first.map_or(Ok(()), |message| Err(anyhow!("the adapter '{}' reported: {message}", self.info.name)))
+        let Some(DeviceError { message, is_transient }) = first else { return Ok(()) };
+        let message = format!("the adapter '{}' reported: {message}", self.info.name);
+        if is_transient {
+            return Err(Transient::new(message).into());
+        }
+        bail!(message)
+    }
+
+    /// The error for a device that does not answer any more.
+    fn lost(&self, failure: impl Display) -> anyhow::Error {
+        Transient::new(format!("the adapter '{}' does not answer any more: {failure}", self.info.name)).into()
     }
 }

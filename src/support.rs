@@ -1,11 +1,14 @@
-//! What knows nothing of radiance fields: charts, image metrics, files, locks, formatting of numbers, and remedies.
+//! What knows nothing of radiance fields: charts, image metrics, files, locks, formatting of numbers, remedies, and
+//! what ends a computation early.
 
 #[cfg(feature = "run")]
 pub mod chart;
 pub mod file;
 pub mod format;
+pub mod interrupt;
 pub mod lock;
 pub mod metrics;
 pub mod remedy;
 pub mod statistics;
 pub mod temporary;
+pub mod transient;

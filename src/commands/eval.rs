@@ -48,6 +48,7 @@ fn measure(
     session: &Session<'_>,
 ) -> Result<Vec<Score>> {
     let mut scores = Vec::with_capacity(indices.len());
+    session.end_gracefully()?;
     evaluator.each(indices, None, &mut session.narrator(), |position, compared| {
         let Compared { mut score, size: [width, height], rendered, .. } = compared;
         if let Some(picture) = pictures.get(position) {

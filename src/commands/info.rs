@@ -56,8 +56,7 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
         let marked = (report.problems.iter().filter(|problem| problem.severity != Severity::Note))
             .flat_map(|problem| problem.frames.iter().copied());
         let drawing = map::draw(&dataset, &report.survey, &marked.collect());
-        let written = write_atomically(path, |file| Ok(file.write_all(drawing.svg().as_bytes())?));
-        written.map_err(|error| Failed(format!("{error:#}")))?;
+        write_atomically(path, |file| Ok(file.write_all(drawing.svg().as_bytes())?))?;
     }
     match report.problems.first().filter(|problem| problem.severity == Severity::Error) {
         Some(problem) => Err(Failed(format!("training would fail: {}", problem.message)).into()),

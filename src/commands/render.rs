@@ -67,6 +67,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
         let mut renderer = field.renderer(&gpu, &lenses)?;
         let writer = Writer { args, color_space: field.color_space(), depth_range: range, folder };
         let progress = Progress::new(session.console, "rendering");
+        session.end_gracefully()?;
         seconds = render_and_write(&mut renderer, &jobs, writer, &progress)?;
     }
     let (out, skipped) = (args.out.display().to_string(), all - jobs.len());

@@ -18,8 +18,6 @@ use nerf::run::{
 };
 use nerf::support::format::count;
 use serde_json::json;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let (folder, checkpoint) = folder(args)?;
@@ -41,22 +39,30 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let mut narrator = session.narrator();
     let run = TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation };
     let mut training = run.begin(&mut narrator)?;
-    let stop = stop_on_interrupt()?;
-    let end = training.train(&stop, &mut narrator)?;
-    let views = training.evaluate(&end, &mut narrator)?.map_err(|reason| without_views(reason, args));
+    session.end_gracefully()?;
+    let end = training.train(&mut narrator)?;
+    let folder = args.out.display().to_string();
+    let saved = || format!("the run is saved to {folder}, but ");
+    let views = training
+        .evaluate(&end, &mut narrator)
+        .with_context(|| saved() + "its test views were not measured")?;
+    let views = views.map_err(|reason| without_views(reason, args));
     drop(narrator);
     let summary = views.as_ref().ok().and_then(TestViews::summary);
     let report = training.write_report(&end, views);
-    let folder = args.out.display().to_string();
+    let is_interrupted = session.check_interrupt().is_err();
     let mut result = json!({
         "run": folder,
         "steps": end.step,
         "seconds": end.seconds,
         "loss": end.loss.map(|[_, last]| last),
         "skipped": end.skipped,
-        "interrupted": end.interrupted,
+        "interrupted": is_interrupted,
     });
     let mut text = end_line(&end, training.metadata(), &folder);
+    if is_interrupted && !end.interrupted {
+        text = format!("interrupted when all steps were taken; {text}");
+    }
     if let Some(summary) = summary {
         score_summary::add(&mut result, Some(&summary));
         text = format!("{}; {text}", score_summary::describe(&summary));
@@ -67,9 +73,10 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     }
     match report {
         Ok(page) => result["report"] = json!(page.display().to_string()),
-        Err(error) => session.console.warn(&format!("the run is saved, but {}", with_flags(&error))),
+        Err(error) => session.console.warn(&format!("{}{}", saved(), with_flags(&error))),
     }
-    session.print(&result, &text)
+    session.print(&result, &text).with_context(|| saved() + "its result could not be printed")?;
+    if is_interrupted { session.check_interrupt() } else { Ok(()) }
 }
 
 /// The folder to write to, and the run in it to go on with.
@@ -106,19 +113,6 @@ fn options(args: &Train) -> TrainOptions {
         deterministic: args.deterministic,
         budget: Budget { steps: args.steps, seconds: args.seconds },
     }
-}
-
-/// A flag that Ctrl-C raises; pressed again, it ends the program at once.
-fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if raised.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })
-    .context("listening for Ctrl-C")?;
-    Ok(stop)
 }
 
 /// How the run went, in one line; `metadata` describes its beginning.

@@ -88,7 +88,7 @@ impl Renderer {
     /// Renders what `camera` sees.
     ///
     /// # Errors
-    /// When the device was lost, or the camera has a lens that was not linked.
+    /// When the device was lost, its interrupt was raised, or the camera has a lens that was not linked.
     pub fn render(&mut self, camera: &Camera) -> Result<View> {
         let (kind, lenses) = (camera.lens.kind(), &self.plan.features.lenses);
         if !lenses.contains(&kind) {
@@ -123,18 +123,22 @@ impl Renderer {
     }
 
     /// Renders a band of pixels. As many rounds as the last band took are submitted before the device is asked whether
-    /// rays are left, and few more at a time after that.
+    /// rays are left, and few more at a time after that. At most two submissions are under way, so that a wish to stop is
+    /// heard soon.
     fn render_band(&mut self, band: Range<usize>, step_excess: f32) -> Result<()> {
         self.begin_band(&band, step_excess);
         let rays = self.plan.capacity.rays;
         // A ray has a sample or more in each of its rounds, and no slot stays free.
         let most = (band.len() / rays + 1) * (self.plan.config.march.most_steps + 1);
         let (mut submitted, mut more) = (0, self.rounds);
+        let mut under_way = None;
         loop {
             for begun in (0..more).step_by(MOST_ROUNDS) {
+                self.gpu.interrupt.check()?;
                 let stages = self.round.iter().chain([&self.refill]);
                 let rounds = repeat_n(stages, MOST_ROUNDS.min(more - begun)).flatten();
-                self.gpu.run("rounds of a view", rounds, None);
+                let submission = self.gpu.run("rounds of a view", rounds, None);
+                under_way.replace(submission).map_or(Ok(()), |earlier| self.gpu.wait_for(earlier))?;
             }
             submitted += more;
             let progress = self.workspace.read::<Progress>(&self.gpu, "progress", 1)?[0];

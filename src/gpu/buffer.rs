@@ -98,7 +98,7 @@ impl Gpu {
         self.submit(encoder);
         staging.map_async(wgpu::MapMode::Read, .., |_| {});
         self.wait()?;
-        let mapped = staging.get_mapped_range(..)?;
+        let mapped = staging.get_mapped_range(..).map_err(|failure| self.lost(failure))?;
         Ok(bytemuck::pod_collect_to_vec(&mapped[..bytes as usize]))
     }
 }

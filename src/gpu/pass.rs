@@ -88,7 +88,7 @@ impl Gpu {
         label: &str,
         stages: impl IntoIterator<Item = &'a Stage>,
         timer: Option<&mut Timer>,
-    ) {
+    ) -> wgpu::SubmissionIndex {
         let mut encoder = self.encoder(label);
         if let Some(timer) = timer {
             for stage in stages {
@@ -109,6 +109,6 @@ impl Gpu {
                 stage.record(&mut pass);
             }
         }
-        self.submit(encoder);
+        self.submit(encoder)
     }
 }

@@ -57,7 +57,7 @@ impl<'a> Evaluator<'a> {
     /// Renders frame `index` and compares it with its photo, where the photo's pixels count.
     ///
     /// # Errors
-    /// When the device was lost.
+    /// When the device was lost, or its interrupt was raised.
     pub fn compare(&mut self, index: usize, photo: &Photo) -> Result<Compared> {
         let frame = &self.dataset.frames[index];
         let view = self.renderer.render(&frame.camera)?;
@@ -85,7 +85,7 @@ impl<'a> Evaluator<'a> {
     /// many frames it came to.
     ///
     /// # Errors
-    /// When a photo cannot be read, the device was lost, or `take` fails.
+    /// When a photo cannot be read, the device was lost or its interrupt raised, or `take` fails.
     pub fn each(
         &mut self,
         indices: &[usize],
@@ -135,7 +135,7 @@ impl<'a> Evaluator<'a> {
     /// Measures the frames whose photos are kept; `None` if there are none.
     ///
     /// # Errors
-    /// When the device was lost.
+    /// When the device was lost, or its interrupt was raised.
     pub fn kept(&mut self) -> Result<Option<Means>> {
         let kept = std::mem::take(&mut self.kept);
         let scores: Result<Vec<_>> =

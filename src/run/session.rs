@@ -20,11 +20,11 @@ use crate::field::Field;
 use crate::field::checkpoint::Metadata;
 use crate::field::trainer::Trainer;
 use crate::gpu::Gpu;
+use crate::support::interrupt::{Interrupt, Interrupted};
 use crate::support::metrics::PSNR_CAP_DB;
-use anyhow::{Result, anyhow};
+use anyhow::{Context, Result};
 pub use ending::NoTestViews;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Test views that are measured while training.
@@ -88,8 +88,8 @@ impl<'a> TrainingRun<'a> {
     /// Loads the photos, builds the kernels, and begins or goes on with the files of the folder.
     ///
     /// # Errors
-    /// When the memory does not suffice, a photo cannot be read, the adapter refuses a kernel, or the folder cannot be
-    /// written to.
+    /// When the memory does not suffice, a photo cannot be read, the adapter refuses a kernel, its interrupt was raised, or
+    /// the folder cannot be written to.
     pub fn begin(self, observer: &mut dyn Observer) -> Result<TrainingSession<'a>> {
         let Self { gpu, dataset, mut resolved, mut folder, evaluation } = self;
         let Resolved { metadata, plan, test, .. } = &resolved;
@@ -152,25 +152,31 @@ impl TrainingSession<'_> {
         &self.metadata
     }
 
-    /// Trains until the budget is spent or `stop` is raised, and saves.
+    /// The wish to stop.
+    fn interrupt(&self) -> &Interrupt {
+        &self.stepper.trainer().gpu().interrupt
+    }
+
+    /// Trains until the budget is spent or the device's interrupt is raised, and saves.
     ///
     /// # Errors
     /// When training diverges, the device was lost, or the checkpoint cannot be written in the end; until then that is a
     /// [`Warning`]. The newest checkpoint stays; the message names its step.
-    pub fn train(&mut self, stop: &AtomicBool, observer: &mut dyn Observer) -> Result<TrainingEnd> {
-        while !self.stepper.is_over() && !stop.load(Ordering::Relaxed) {
+    pub fn train(&mut self, observer: &mut dyn Observer) -> Result<TrainingEnd> {
+        while !self.stepper.is_over() && !self.interrupt().is_raised() {
             let step = self.stepper.steps();
             let every = self.evaluation.every;
             let pause = Budget {
                 steps: every.map(|every| (step - step % every).saturating_add(every)),
                 seconds: None,
             };
-            let block = self.stepper.block(pause).map_err(|error| anyhow!("{error:#}; {}", self.kept()))?;
+            let block = self.stepper.block(pause);
+            let block = block.with_context(|| format!("at step {} ({})", self.stepper.steps(), self.kept()))?;
             self.record(block, observer)?;
             self.evaluate_if_due(observer)?;
             self.save_if_due(observer)?;
         }
-        self.save_at_end(stop, observer)?;
+        self.save_at_end(observer)?;
         let (step, seconds) = (self.stepper.steps(), self.stepper.seconds());
         let stages = self.stepper.stages().per_step();
         if !stages.is_empty() {
@@ -220,7 +226,11 @@ impl TrainingSession<'_> {
             return Ok(());
         }
         let clock = Instant::now();
-        let Some(means) = evaluator.kept()? else { return Ok(()) };
+        let means = match evaluator.kept() {
+            Err(error) if Interrupted::is_cause_of(&error) => None,
+            measured => measured?,
+        };
+        let Some(means) = means else { return Ok(()) };
         observer.notice(&Event::Evaluated { step, means });
         let row = log::Evaluation {
             step: step.into(),

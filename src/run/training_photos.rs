@@ -45,7 +45,8 @@ impl<'a> TrainingPhotos<'a> {
     /// the plan has them.
     ///
     /// # Errors
-    /// When a file cannot be read, the device cannot hold the photos, or they are not as the plan expects.
+    /// When a file cannot be read, the device cannot hold the photos or its interrupt was raised, or they are not as the
+    /// plan expects.
     pub fn load(&self, gpu: &Arc<Gpu>, plan: &Plan, observer: &mut dyn Observer) -> Result<TrainingViews> {
         let (dataset, frames) = (self.dataset, self.frames);
         let mut views = TrainingViews::new(gpu, plan, &self.cameras())?;
@@ -57,6 +58,7 @@ impl<'a> TrainingPhotos<'a> {
             if photo.is_ignored() {
                 ignored.push(dataset.frames[frames[position]].name.as_str());
             }
+            gpu.interrupt.check()?;
             views.add(&photo)?;
             observer.notice(&Event::Loading { done: position + 1, all: frames.len() });
             Ok(())

@@ -11,6 +11,8 @@ mod render;
 mod report;
 mod scores;
 mod sidecars;
+#[cfg(unix)]
+mod signals;
 #[path = "../support/mod.rs"]
 mod support;
 mod training;

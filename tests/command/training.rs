@@ -12,12 +12,12 @@ use nerf::run::{
     EvaluationAtEnd, EvaluationOptions, Event, NoTestViews, Observer, Resolved, RunFolder, TrainOptions,
     TrainingRun,
 };
+use nerf::support::interrupt::Interrupt;
 use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 
 /// In decibels. The smoke test reaches 27.6 on a CPU adapter. With a wrong factor in the density gradient it
@@ -157,11 +157,11 @@ fn an_interrupted_training_goes_on() {
     }
     for how in ["--resume", "--overwrite"] {
         let second = quietly(&["train", text(&TOYS), "--out", text(&parts), how]).assert();
-        second.code(1).stderr(contains(format!("process {} writes to it", child.id())));
+        second.code(3).stderr(contains(format!("process {} writes to it", child.id())));
     }
     let signalled = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(signalled.expect("kill runs").success());
-    assert_eq!(child.wait().expect("ends").code(), Some(0), "interrupting is no failure");
+    assert_eq!(child.wait().expect("ends").code(), Some(130), "scripts stop");
     let step = checkpoint(&parts).metadata.step;
     assert!((16..300).contains(&step), "interrupted at {step}");
     train(&TOYS, &parts, &["--no-eval", "--resume"]);
@@ -313,7 +313,7 @@ fn deterministic_runs_are_equal_bit_for_bit() {
 /// The kinds of what a run tells; asks it to stop after so many steps.
 struct Listener {
     told: Vec<&'static str>,
-    stop: Arc<AtomicBool>,
+    stop: Interrupt,
     last_step: u32,
 }
 
@@ -324,7 +324,9 @@ impl Observer for Listener {
             Event::Memory(_) => "memory",
             Event::Loading { .. } => "loading",
             Event::Steps(taken) => {
-                self.stop.store(taken.step >= self.last_step, Ordering::Relaxed);
+                if taken.step >= self.last_step {
+                    self.stop.raise();
+                }
                 "steps"
             }
             Event::Evaluated { .. } => "evaluated",
@@ -341,12 +343,13 @@ impl Observer for Listener {
 
 #[test]
 fn a_run_without_a_terminal_tells_what_happens_and_stops_when_asked() {
-    let gpu = Arc::new(Gpu::open(&adapter::choose(None).expect("an adapter")).expect("it opens"));
     let dataset = Dataset::open(&TOYS, &OpenOptions::default()).expect("a dataset");
     let path = place("library");
-    let stop = Arc::new(AtomicBool::new(false));
-    let mut listener = Listener { told: Vec::new(), stop: Arc::clone(&stop), last_step: 32 };
+    let mut listener = Listener { told: Vec::new(), stop: Interrupt::default(), last_step: 32 };
     let train = |end: u32, listener: &mut Listener| {
+        let mut gpu = Gpu::open(&adapter::choose(None).expect("an adapter")).expect("it opens");
+        gpu.interrupt = listener.stop.clone();
+        let gpu = Arc::new(gpu);
         let budget = Budget { steps: Some(end), seconds: None };
         let options = TrainOptions { config: Some(PathBuf::from(SMOKE)), budget, ..TrainOptions::default() };
         let (folder, resolved) = match RunFolder::to_resume(&path) {
@@ -354,10 +357,10 @@ fn a_run_without_a_terminal_tells_what_happens_and_stops_when_asked() {
             Err(_) => (RunFolder::unused(&path).expect("empty"), Resolved::new_run(&options, &dataset, &gpu)),
         };
         let evaluation = EvaluationOptions { every: Some(32), at_end: EvaluationAtEnd::All };
-        let (gpu, resolved) = (Arc::clone(&gpu), resolved.expect("it fits"));
+        let resolved = resolved.expect("it fits");
         let run = TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation };
         let mut session = run.begin(listener).expect("it begins");
-        let end = session.train(&stop, listener).expect("it trains");
+        let end = session.train(listener).expect("it trains");
         let views = session.evaluate(&end, listener).expect("measured");
         let page = session.write_report(&end, Err("not asked for".to_owned())).expect("written");
         assert!(page.is_file());
@@ -369,8 +372,7 @@ fn a_run_without_a_terminal_tells_what_happens_and_stops_when_asked() {
     assert!(
         listener.told.iter().filter(|kind| **kind != "steps").eq(all.iter().filter(|kind| **kind != "steps"))
     );
-    stop.store(false, Ordering::Relaxed);
-    listener.last_step = u32::MAX;
+    (listener.stop, listener.last_step) = (Interrupt::default(), u32::MAX);
     let (end, views) = train(48, &mut listener);
     assert!(end.step == 48 && !end.interrupted, "{end:?}");
     assert_eq!(views.map(|views| views.count()), Ok(5));

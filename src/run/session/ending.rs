@@ -26,7 +26,8 @@ pub enum NoTestViews {
 }
 
 impl TrainingSession<'_> {
-    /// Measures the test views as the field is at the end, and logs what they say; or why they are not measured.
+    /// Measures the test views as the field is at the end, and logs what they say; or why they are not measured. Where the
+    /// device's interrupt is raised meanwhile, those measured by then are all.
     ///
     /// # Errors
     /// When a photo cannot be read, the device was lost, or the log cannot be written.
@@ -47,6 +48,9 @@ impl TrainingSession<'_> {
             self.evaluation.at_end == EvaluationAtEnd::Share && !self.metadata.config.deterministic;
         let limit = is_limited.then_some(EVALUATION_SHARE * end.seconds);
         let views = TestViews::measure(evaluator, &self.test, limit, observer)?;
+        if views.count() == 0 && self.interrupt().is_raised() {
+            return Ok(Err(NoTestViews::Interrupted));
+        }
         if let Some(summary) = views.summary() {
             let row = log::Evaluation {
                 step: end.step.into(),

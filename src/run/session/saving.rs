@@ -7,8 +7,6 @@ use crate::run::log::LogRow;
 use crate::support::lock::InUse;
 use anyhow::{Context, Error, Result};
 use std::io;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::sleep;
 use std::time::Duration;
 
 /// Seconds of training between checkpoints.
@@ -56,14 +54,17 @@ impl TrainingSession<'_> {
         if self.saved.0 < self.stepper.steps() { self.save(observer) } else { Ok(()) }
     }
 
-    /// Saves when all steps are taken; tries again a few times unless `stop` is raised, since all since the last checkpoint
-    /// would be lost.
-    pub(super) fn save_at_end(&mut self, stop: &AtomicBool, observer: &mut dyn Observer) -> Result<()> {
-        for pause in PAUSES.iter().filter(|_| !stop.load(Ordering::Relaxed)) {
+    /// Saves when all steps are taken; tries again a few times unless an end was asked for, since all since the last
+    /// checkpoint would be lost.
+    pub(super) fn save_at_end(&mut self, observer: &mut dyn Observer) -> Result<()> {
+        for pause in PAUSES {
+            if self.interrupt().is_raised() {
+                break;
+            }
             if self.try_to_save(observer)? {
                 return Ok(());
             }
-            sleep(*pause);
+            self.interrupt().sleep(pause);
         }
         self.save(observer)
     }
