@@ -10,5 +10,6 @@ pub mod lock;
 pub mod metrics;
 pub mod remedy;
 pub mod statistics;
+pub mod stopwatch;
 pub mod temporary;
 pub mod transient;

@@ -79,6 +79,18 @@ impl StepClock {
         until(self.budget).min(until(pause))
     }
 
+    /// Whether no step was taken on it yet, so that nobody knows how long one takes.
+    #[must_use]
+    pub fn is_new(&self) -> bool {
+        self.seconds_per_step <= 0.0
+    }
+
+    /// The steps that take `seconds` at the pace of the last ones: at least one and at most `most`.
+    #[must_use]
+    pub fn steps_within(&self, seconds: f64, most: u32) -> u32 {
+        if self.is_new() { most } else { ((seconds / self.seconds_per_step) as u32).clamp(1, most) }
+    }
+
     /// Lets `seconds` pass, in which `steps` steps were taken.
     pub fn pass(&mut self, seconds: f64, steps: u32) {
         self.seconds += seconds;
@@ -102,13 +114,15 @@ mod tests {
     #[test]
     fn time_passes_with_steps() {
         let mut clock = clock(false);
+        assert!(clock.is_new() && clock.steps_within(0.1, 16) == 16);
         assert_eq!(clock.steps_until(Budget { steps: Some(20), seconds: None }, 16, 16), 4);
         clock.pass(3.0, 2);
         assert_eq!((clock.seconds(), clock.spent(7)), (5.0, 0.5));
         assert_eq!(clock.steps_until(Budget::default(), 7, 16), 4, "5 seconds at 1.5 each");
         assert!((clock.remaining(7, (0, 2.0)) - 3.0 * 0.5 / 0.3).abs() < 1e-9);
+        assert_eq!([clock.steps_within(4.0, 16), clock.steps_within(0.1, 16)], [2, 1], "at 1.5 seconds each");
         clock.pass(5.0, 2);
-        assert!(clock.is_over(7));
+        assert!(clock.is_over(7) && !clock.is_new());
     }
 
     #[test]

@@ -4,11 +4,13 @@ use super::clock::StepClock;
 use super::stage_times::StageTimes;
 use crate::config::schedule::Budget;
 use crate::field::trainer::{StepStats, Trainer};
+use crate::support::stopwatch::Stopwatch;
 use anyhow::{Result, bail};
-use std::time::Instant;
 
 /// Most steps of a block.
 const BLOCK: u32 = 16;
+/// Seconds of a block at most, unless one step takes longer: so soon a wish to stop is heard.
+const LONGEST_BLOCK: f64 = 1.0;
 /// A run ends when so many steps in a row had gradients that could not be used.
 const MOST_SKIPPED: u32 = 16;
 
@@ -17,6 +19,7 @@ const MOST_SKIPPED: u32 = 16;
 pub struct Stepper {
     trainer: Trainer,
     clock: StepClock,
+    watch: Stopwatch,
     stages: StageTimes,
     /// Skipped steps, and how many of them came last.
     skipped: (u32, u32),
@@ -35,7 +38,8 @@ impl Stepper {
     /// A trainer at the time of `clock`.
     #[must_use]
     pub fn new(trainer: Trainer, clock: StepClock) -> Self {
-        Self { stages: StageTimes::new(trainer.gpu()), trainer, clock, skipped: (0, 0) }
+        let (watch, stages) = (Stopwatch::default(), StageTimes::new(trainer.gpu()));
+        Self { trainer, clock, watch, stages, skipped: (0, 0) }
     }
 
     /// What takes the steps.
@@ -86,22 +90,32 @@ impl Stepper {
         self.skipped.0
     }
 
-    /// Takes at least one and at most 16 steps, neither beyond the budget nor beyond `pause`, and waits.
+    /// Takes at least one and at most 16 steps, about a second of them, neither beyond the budget nor beyond `pause`, and
+    /// waits.
     ///
     /// # Errors
     /// When training diverges, or the device was lost.
     pub fn block(&mut self, pause: Budget) -> Result<Block> {
         let first = self.steps();
-        let count = self.clock.steps_until(pause, first, BLOCK);
+        let mut count = self.clock.steps_until(pause, first, self.clock.steps_within(LONGEST_BLOCK, BLOCK));
         let mut stages = self.stages.of_block(first / BLOCK);
-        let start = Instant::now();
-        for step in first..first + count {
-            let learning_rate = self.clock.learning_rate(step, start.elapsed().as_secs_f64());
+        let start = self.watch.seconds();
+        let mut taken = 0;
+        while taken < count {
+            let elapsed = self.watch.seconds() - start;
+            let learning_rate = self.clock.learning_rate(first + taken, elapsed);
             let timer = stages.as_mut().and_then(|stages| stages.of_step());
             self.trainer.step(learning_rate, timer)?;
+            taken += 1;
+            if taken == 1 && self.clock.is_new() {
+                // Nobody knows yet how many fit.
+                self.trainer.gpu().wait()?;
+                let fitting = LONGEST_BLOCK / (self.watch.seconds() - start).max(1e-9);
+                count = count.min(fitting as u32).max(1);
+            }
         }
         let stats = self.trainer.report()?;
-        let seconds = start.elapsed().as_secs_f64();
+        let seconds = self.watch.seconds() - start;
         self.clock.pass(seconds, count);
         self.check(&stats)?;
         Ok(Block { stats, seconds })
