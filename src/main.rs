@@ -3,6 +3,7 @@
 mod cli;
 mod commands;
 mod console;
+mod environment;
 mod flags;
 mod narrator;
 mod progress;
@@ -24,6 +25,7 @@ const TRY_AGAIN: u8 = 3;
 
 fn main() -> ExitCode {
     let cli = cli::Cli::try_parse().unwrap_or_else(|error| usage(&error));
+    environment::without_complaints();
     let signals = Signals::listen(cli.global.json);
     match commands::run(&cli, &signals) {
         Ok(()) => ExitCode::SUCCESS,
