@@ -121,6 +121,9 @@ pub(crate) struct Train {
     /// Continue the run in RUN
     #[arg(long, conflicts_with = "overwrite")]
     pub(crate) resume: bool,
+    /// Continue the run in RUN if one was saved there, else start it: for jobs that are queued again
+    #[arg(long, conflicts_with_all = ["resume", "overwrite"])]
+    pub(crate) resume_or_start: bool,
     /// Replace the run in RUN
     #[arg(long)]
     pub(crate) overwrite: bool,

@@ -85,6 +85,9 @@ fn folder(args: &Train) -> Result<(RunFolder, Option<Checkpoint>)> {
         let (folder, checkpoint) = RunFolder::to_resume(&args.out)?;
         return Ok((folder, Some(checkpoint)));
     }
+    if args.resume_or_start {
+        return RunFolder::to_resume_or_start(&args.out);
+    }
     let folder = if args.overwrite { RunFolder::to_overwrite } else { RunFolder::unused };
     Ok((folder(&args.out)?, None))
 }

@@ -94,6 +94,20 @@ impl RunFolder {
         Ok((folder, Checkpoint::load(&file)?))
     }
 
+    /// The folder of a run to go on with, and its checkpoint. Without one it is a folder for a new run, which replaces what an
+    /// earlier one left that ended before it saved.
+    ///
+    /// # Errors
+    /// When it is no folder, cannot be written to, its checkpoint cannot be used, or another process trains into it.
+    pub fn to_resume_or_start(path: &Path) -> Result<(Self, Option<Checkpoint>)> {
+        let folder = Self::to_overwrite(path)?;
+        let file = folder.checkpoint();
+        // Where anything else is the matter, it must not be replaced.
+        let is_missing = fs::metadata(&file).is_err_and(|error| error.kind() == ErrorKind::NotFound);
+        let checkpoint = if is_missing { None } else { Some(Checkpoint::load(&file)?) };
+        Ok((folder, checkpoint))
+    }
+
     /// Whether nothing keeps other processes from writing to it, since its file system has no locks.
     #[must_use]
     pub fn is_unguarded(&self) -> bool {

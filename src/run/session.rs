@@ -171,7 +171,8 @@ impl TrainingSession<'_> {
                 seconds: None,
             };
             let block = self.stepper.block(pause);
-            let block = block.with_context(|| format!("at step {} ({})", self.stepper.steps(), self.kept()))?;
+            let block =
+                block.with_context(|| format!("at step {} ({})", self.stepper.steps(), self.kept()))?;
             self.record(block, observer)?;
             self.evaluate_if_due(observer)?;
             self.save_if_due(observer)?;

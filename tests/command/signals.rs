@@ -157,3 +157,77 @@ fn an_ignored_hangup_stays_ignored() {
     let (code, said, _) = running.until(|| rows() > before + 2).signal("TERM").end();
     assert_eq!(code, Some(143), "{said}");
 }
+
+/// What a scheduler runs again and again, whatever happened in between.
+#[test]
+fn one_command_line_starts_resumes_and_ends() {
+    let run = place("queued");
+    let args =
+        ["train", text(&TOYS), "--out", text(&run), "--config", SMOKE, "--resume-or-start", "--no-eval"];
+    let more = ["--steps", "400", "--seed", "3", "--set", "grid.levels=4", "--background", "white"];
+    let again = || Running::nerf(&[&args[..], &more, &["--json"]].concat());
+    // A process that was killed before it saved leaves so much.
+    std::fs::create_dir(&run).expect("writable");
+    for (file, text) in
+        [("config.json", "{}"), ("log.jsonl", "{\"st"), (".nerf-abcdef.part", "half"), ("job.log", "")]
+    {
+        std::fs::write(run.join(file), text).expect("writable");
+    }
+    let (code, said, _) = again().until(|| is_training(&run)).signal("TERM").end();
+    assert_eq!(code, Some(143), "{said}");
+    let reached = checkpoint(&run).metadata.step;
+    assert!((1..400).contains(&reached), "{reached}");
+    for _ in 0..2 {
+        let (code, said, errors) = again().end();
+        let result: Value = serde_json::from_str(&said).expect("one JSON value");
+        assert_eq!((code, &result["steps"]), (Some(0), &400.into()), "{errors}");
+    }
+    assert!(run.join("job.log").exists() && !whole_files(&run).is_empty());
+    // What was saved must not be replaced by a new start.
+    let file = run.join("checkpoint.safetensors");
+    std::fs::write(&file, "damaged").expect("writable");
+    let (code, said, errors) = again().end();
+    assert_eq!(code, Some(1), "{said}");
+    assert!(errors.contains("checkpoint.safetensors cannot be used"), "{errors}");
+    assert_eq!(std::fs::read(&file).expect("kept"), b"damaged");
+}
+
+/// The end of a command whose files or output can take no more.
+#[cfg(target_os = "linux")]
+#[test]
+fn full_disks_are_worth_another_try() {
+    let run = place("full");
+    let args = [
+        "train",
+        text(&TOYS),
+        "--out",
+        text(&run),
+        "--config",
+        SMOKE,
+        "--steps",
+        "16",
+        "--no-eval",
+        "--quiet",
+    ];
+    let script = |script: &str| {
+        let mut command = Command::new("bash");
+        command.args(["-c", script]).arg(assert_cmd::cargo::cargo_bin!("nerf"));
+        command
+    };
+    let (code, said, errors) = Running::start(script("exec \"$0\" \"$@\" > /dev/full").args(args)).end();
+    assert_eq!((code, said.as_str()), (Some(3), ""));
+    let expected =
+        format!("error: the run is saved to {}, but its result could not be printed", run.display());
+    assert!(errors.starts_with(&expected) && errors.lines().count() == 1, "{errors}");
+    assert_eq!(checkpoint(&run).metadata.step, 16);
+
+    let dataset = place("too_large");
+    let generate = ["generate", "toys", "--out", text(&dataset), "--views", "4", "--size", "400", "--hdr"];
+    let (code, _, errors) = Running::start(script("ulimit -f 100; exec \"$0\" \"$@\"").args(generate)).end();
+    assert_eq!(code, Some(3), "{errors}");
+    let (code, _, errors) =
+        Running::start(script("ulimit -n 9; exec \"$0\" \"$@\"").args(["info", text(&TOYS)])).end();
+    assert_eq!(code, Some(3), "{errors}");
+    let (code, _, errors) = Running::nerf(&["info", text(&dataset.join("missing"))]).end();
+    assert_eq!(code, Some(1), "{errors}");
+}
