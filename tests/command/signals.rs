@@ -164,7 +164,7 @@ fn one_command_line_starts_resumes_and_ends() {
     let run = place("queued");
     let args =
         ["train", text(&TOYS), "--out", text(&run), "--config", SMOKE, "--resume-or-start", "--no-eval"];
-    let more = ["--steps", "400", "--seed", "3", "--set", "grid.levels=4", "--background", "white"];
+    let more = ["--steps", "400", "--seed", "3", "--set", "grid.levels=8", "--background", "white"];
     let again = || Running::nerf(&[&args[..], &more, &["--json"]].concat());
     // A process that was killed before it saved leaves so much.
     std::fs::create_dir(&run).expect("writable");
