@@ -15,7 +15,8 @@ use nerf::field::trainer::Trainer;
 use nerf::gpu::Gpu;
 use nerf::run::results::{circumstances, joined, markdown, optional, quoted, write_csv, write_text};
 use nerf::run::{Resolved, StepClock, Stepper, TrainOptions};
-use nerf::support::file::{writable_folder, write_json};
+use nerf::support::file::write_json;
+use nerf::support::lock::FolderLock;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -63,7 +64,7 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
     ensure!(!dataset.test.is_empty(), "the dataset has no test views to measure; a benchmark needs some");
     let gpu = session.open_gpu()?;
     let planned = plan(args, &dataset, &gpu)?;
-    writable_folder(&args.out)?;
+    let _lock = FolderLock::alone(&args.out)?;
     let benchmark = Benchmark { gpu, dataset: &dataset, views: args.views as usize };
     let about = joined(
         circumstances(&benchmark.gpu),

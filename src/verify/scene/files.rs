@@ -7,6 +7,7 @@ use crate::camera::{Camera, Lens, LensKind};
 use crate::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use crate::photo::Split;
 use crate::support::file::write_json;
+use crate::support::lock::{FolderLock, is_used};
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -21,7 +22,7 @@ pub(super) fn write(
     out: &Path,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Summary> {
-    claim(out)?;
+    let _lock = claim(out)?;
     let views: Vec<GeneratedView> = SPLITS
         .into_iter()
         .flat_map(|split| (0..view_count(options, split)).map(move |index| (split, index)))
@@ -47,16 +48,14 @@ pub(super) fn write(
     Ok(Summary { scene: scene.info().name, views: views.len(), files })
 }
 
-/// Creates the folder `out`, or accepts it where it is empty.
-fn claim(out: &Path) -> Result<()> {
-    let show = out.display();
-    if out.exists() {
-        let mut entries = fs::read_dir(out).with_context(|| format!("{show} cannot be used as a folder"))?;
-        if entries.next().is_some() {
-            bail!("{show} is not empty; name a new or empty folder, or remove it first");
-        }
+/// Creates the folder `out`, or accepts it where it is empty; nobody else writes to it meanwhile.
+fn claim(out: &Path) -> Result<FolderLock> {
+    is_used(out)?;
+    let lock = FolderLock::alone(out)?;
+    if is_used(out)? {
+        bail!("{} is not empty; name a new or empty folder, or remove it first", out.display());
     }
-    fs::create_dir_all(out).with_context(|| format!("creating {show}"))
+    Ok(lock)
 }
 
 /// One picture of the dataset.
