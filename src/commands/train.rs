@@ -76,7 +76,10 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         Err(error) => session.console.warn(&format!("{}{}", saved(), with_flags(&error))),
     }
     session.print(&result, &text).with_context(|| saved() + "its result could not be printed")?;
-    if is_interrupted { session.check_interrupt() } else { Ok(()) }
+    if is_interrupted {
+        return session.check_interrupt();
+    }
+    training.finish_log().with_context(|| saved() + "its log lacks rows")
 }
 
 /// The folder to write to, and the run in it to go on with.

@@ -4,7 +4,7 @@ use super::log::Log;
 use super::log_writer::LogWriter;
 use crate::config::Config;
 use crate::field::checkpoint::{self, Checkpoint};
-use crate::support::file::write_json;
+use crate::support::file::{behind_links, write_json};
 use crate::support::lock::{FolderLock, is_used};
 use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Context, Result, bail};
@@ -124,6 +124,15 @@ impl RunFolder {
     #[must_use]
     pub fn checkpoint(&self) -> PathBuf {
         self.path.join(Self::CHECKPOINT)
+    }
+
+    /// The folder that the checkpoint is written to, wherever a link leads.
+    ///
+    /// # Errors
+    /// When links lead in a circle.
+    pub(super) fn of_checkpoint(&self) -> Result<PathBuf> {
+        let file = behind_links(&self.checkpoint())?;
+        Ok(file.parent().unwrap_or(&self.path).to_owned())
     }
 
     /// Where the page about the run goes.

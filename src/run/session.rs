@@ -22,6 +22,7 @@ use crate::field::trainer::Trainer;
 use crate::gpu::Gpu;
 use crate::support::interrupt::{Interrupt, Interrupted};
 use crate::support::metrics::PSNR_CAP_DB;
+use crate::support::temporary::remove_leftovers;
 use anyhow::{Context, Result};
 pub use ending::NoTestViews;
 use std::sync::Arc;
@@ -98,7 +99,9 @@ impl<'a> TrainingRun<'a> {
         if folder.is_unguarded() {
             observer.notice(&Event::Warning(Warning::Unguarded { folder: folder.path() }));
         }
-        disk::check(folder.path(), plan.state_bytes(), observer)?;
+        let home = folder.of_checkpoint()?;
+        remove_leftovers(&home);
+        disk::check(&home, plan.state_bytes(), observer)?;
         let clock = Instant::now();
         let views = resolved.photos(dataset).load(&gpu, &resolved.plan, observer)?;
         let load_seconds = clock.elapsed().as_secs_f64();
