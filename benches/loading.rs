@@ -17,6 +17,7 @@ use nerf::field::{Field, Plan};
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::Reading;
 use nerf::run::TrainingPhotos;
+use nerf::run::memory::peak_bytes;
 use nerf::support::format::bytes;
 use rayon::prelude::*;
 
@@ -86,8 +87,8 @@ fn load(folder: &Path, count: usize) -> Result<()> {
     let gpu = Arc::new(Gpu::open(&adapter::choose(None)?)?);
     let plan = Plan::for_dataset(&gpu, &dataset, Config::for_dataset(&dataset, gpu.is_cpu())?)?;
     let photos = TrainingPhotos::of(&dataset);
-    let memory = photos.memory(&plan);
-    memory.check(&gpu, &plan)?;
+    let memory = photos.memory(&plan, &[], gpu.is_cpu());
+    memory.check_device(&gpu, &plan)?;
     let clock = Instant::now();
     let views = photos.load(&gpu, &plan, &mut ())?;
     let loaded = clock.elapsed().as_secs_f64();
@@ -102,17 +103,9 @@ fn load(folder: &Path, count: usize) -> Result<()> {
         count as f64 / loaded,
         bytes(memory.host_bytes),
         bytes(memory.device_bytes),
-        peak().map_or_else(|| "unknown".to_owned(), bytes),
+        peak_bytes().map_or_else(|| "unknown".to_owned(), bytes),
     );
     Ok(())
-}
-
-/// The most bytes that this process has had in use.
-fn peak() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
-    Some(kilobytes << 10)
 }
 
 /// Photos with shapes of all sizes and some grain.

@@ -136,6 +136,9 @@ pub(crate) struct Train {
     /// are measured, at least one. A --deterministic run always measures all.
     #[arg(long, conflicts_with = "no_eval")]
     pub(crate) eval_all: bool,
+    /// Train even where the memory of this machine seems not to suffice, by an estimate
+    #[arg(long)]
+    pub(crate) overcommit: bool,
     /// How photos are read.
     #[command(flatten)]
     pub(crate) reading: photo_flags::PhotoFlags,

@@ -31,6 +31,10 @@ fn advice(remedy: &Remedy) -> String {
         Remedy::FittingPixels { downscale, percent } => format!(
             "use --downscale {downscale}, or --max-images or --crop to leave {percent} % of the pixels"
         ),
+        Remedy::SmallerField => remedy.to_string(),
+        Remedy::OrOvercommit(less) => {
+            format!("{}, or add --overcommit to train all the same", advice(less))
+        }
         Remedy::Downscale(by) => format!("--downscale {by}"),
         Remedy::InvertMasks => "try --invert-masks".to_owned(),
         Remedy::LeaveMasks => "leave out --invert-masks".to_owned(),

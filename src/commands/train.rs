@@ -11,6 +11,7 @@ use nerf::capture::diagnostics::Severity;
 use nerf::capture::health::Survey;
 use nerf::config::schedule::Budget;
 use nerf::field::checkpoint::{Checkpoint, Metadata};
+use nerf::run::memory::peak_bytes;
 use nerf::run::report::test_views::TestViews;
 use nerf::run::{
     EvaluationAtEnd, EvaluationOptions, NoTestViews, Resolved, RunFolder, TrainOptions, TrainingEnd,
@@ -37,7 +38,8 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         },
     };
     let mut narrator = session.narrator();
-    let run = TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation };
+    let run =
+        TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation, overcommit: args.overcommit };
     let mut training = run.begin(&mut narrator)?;
     session.end_gracefully()?;
     let end = training.train(&mut narrator)?;
@@ -58,6 +60,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         "loss": end.loss.map(|[_, last]| last),
         "skipped": end.skipped,
         "interrupted": is_interrupted,
+        "memory": training.memory(),
     });
     let mut text = end_line(&end, training.metadata(), &folder);
     if is_interrupted && !end.interrupted {
@@ -75,6 +78,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         Ok(page) => result["report"] = json!(page.display().to_string()),
         Err(error) => session.console.warn(&format!("{}{}", saved(), with_flags(&error))),
     }
+    result["memory"]["peak_bytes"] = json!(peak_bytes());
     session.print(&result, &text).with_context(|| saved() + "its result could not be printed")?;
     if is_interrupted {
         return session.check_interrupt();

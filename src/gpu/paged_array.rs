@@ -20,7 +20,7 @@ const ROW_BYTES: u64 = (ROW * size_of::<u32>()) as u64;
 /// Storage buffers that a kernel may need besides; `tests/library/shaders.rs` sees to it.
 const OTHER_BINDINGS: u32 = 3;
 /// Bytes written before the device is waited for, which then lets go of its staging memory.
-const STAGED_BYTES: u64 = 64 << 20;
+pub const STAGED_BYTES: u64 = 64 << 20;
 /// Names of the pages.
 const NAMES: [&str; 32] = [
     "page_0", "page_1", "page_2", "page_3", "page_4", "page_5", "page_6", "page_7", "page_8", "page_9",

@@ -38,7 +38,11 @@ impl Estimate {
         let config = Config::for_dataset(dataset, adapter.is_cpu)?.with_finest(dataset);
         let features = SceneFeatures::of_headers(dataset, &config)?;
         let plan = Plan::suited_to(adapter, config, features, Space::from(&dataset.bounds));
-        let memory = TrainingPhotos::of(dataset).memory(&plan);
+        let memory = TrainingPhotos::of(dataset).memory(&plan, &dataset.test, adapter.is_cpu);
+        let excess = gpu.and_then(|gpu| {
+            let shortage = || memory.check_host(adapter.is_cpu).map_err(|shortage| memory.refusal(shortage));
+            memory.check_device(gpu, &plan).and_then(|()| shortage()).err()
+        });
         Ok(Self {
             memory,
             adapter: gpu.map(|gpu| gpu.info.name.clone()),
@@ -46,7 +50,7 @@ impl Estimate {
             most_photo_bytes: gpu.map(|gpu| PageCapacity::of(&gpu.device.limits(), plan.memory).bytes()),
             finest: plan.layout.levels.last().map_or(0, |level| level.resolution),
             left_out: plan.left_out(),
-            excess: gpu.and_then(|gpu| memory.check(gpu, &plan).err()),
+            excess,
         })
     }
 }

@@ -1,6 +1,6 @@
 //! What a run reports while it goes on: one list of events, and who listens.
 
-use super::memory::MemoryUse;
+use super::memory::{MemoryUse, Shortage};
 use super::scores::Means;
 use super::stepper::Block;
 use crate::field::Plan;
@@ -93,6 +93,8 @@ pub struct StepsTaken {
 /// Something that probably makes results worse, as a sentence without a full stop.
 #[derive(Clone, Copy, Debug)]
 pub enum Warning<'a> {
+    /// The run begins although its memory seems not to suffice, as asked.
+    Overcommitted(Shortage),
     /// Masks ignore every pixel of some training photos.
     IgnoredPhotos {
         /// The photos.
@@ -156,6 +158,9 @@ pub enum Warning<'a> {
 impl fmt::Display for Warning<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Overcommitted(shortage) => {
+                write!(f, "{shortage}; it begins all the same, as asked, and the system may end it")
+            }
             Self::IgnoredPhotos { names, all } => write!(
                 f,
                 "masks ignore every pixel of {} of {all} training photos, which add nothing: {}",

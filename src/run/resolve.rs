@@ -1,7 +1,8 @@
 //! What is trained, on what, and for how long: options, a dataset, an adapter and an earlier run together.
 
 use super::evaluate::Evaluator;
-use super::event::{Event, Observer};
+use super::event::{Event, Observer, Warning};
+use super::memory::MemoryUse;
 use super::options::TrainOptions;
 use super::scene_features::NO_FRAME;
 use super::training_photos::TrainingPhotos;
@@ -78,14 +79,29 @@ impl Resolved {
         TrainingPhotos { dataset, frames: &self.train }
     }
 
-    /// Whether there is room for training and its photos, on the host and on the device; reports what they take.
+    /// What training, its photos, and the measuring of the frames `tested` take, where there is room for it on the host and
+    /// on the device; also reports it. With `overcommit` a host that seems too small is only warned of.
     ///
     /// # Errors
     /// When there is not; the message says how much there is, and what to do.
-    pub fn check_memory(&self, gpu: &Gpu, dataset: &Dataset, observer: &mut dyn Observer) -> Result<()> {
-        let memory = self.photos(dataset).memory(&self.plan);
+    pub fn check_memory(
+        &self,
+        gpu: &Gpu,
+        dataset: &Dataset,
+        tested: &[usize],
+        overcommit: bool,
+        observer: &mut dyn Observer,
+    ) -> Result<MemoryUse> {
+        let memory = self.photos(dataset).memory(&self.plan, tested, gpu.is_cpu());
         observer.notice(&Event::Memory(memory));
-        memory.check(gpu, &self.plan)
+        memory.check_device(gpu, &self.plan)?;
+        match memory.check_host(gpu.is_cpu()) {
+            Err(shortage) if overcommit => {
+                observer.notice(&Event::Warning(Warning::Overcommitted(shortage)));
+                Ok(memory)
+            }
+            checked => checked.map(|()| memory).map_err(|shortage| memory.refusal(shortage)),
+        }
     }
 
     /// What measures test views of `field`, on black, with the photos of a `few` of them kept; `None`

@@ -11,6 +11,7 @@ use super::event::{Event, Observer, StepsTaken, Warning};
 use super::folder::RunFolder;
 use super::log::{self, LogRow};
 use super::log_writer::LogWriter;
+use super::memory::MemoryUse;
 use super::options::EvaluationOptions;
 use super::resolve::Resolved;
 use super::stepper::{Block, Stepper};
@@ -44,6 +45,8 @@ pub struct TrainingRun<'a> {
     pub folder: RunFolder,
     /// When test views are measured.
     pub evaluation: EvaluationOptions,
+    /// Whether it begins although the host's memory seems not to suffice.
+    pub overcommit: bool,
 }
 
 /// A training run under way.
@@ -68,6 +71,7 @@ pub struct TrainingSession<'a> {
     /// The first and the last loss of this session.
     loss: Option<[f64; 2]>,
     is_empty: bool,
+    memory: MemoryUse,
 }
 
 /// How a session ended.
@@ -92,10 +96,11 @@ impl<'a> TrainingRun<'a> {
     /// When the memory does not suffice, a photo cannot be read, the adapter refuses a kernel, its interrupt was raised, or
     /// the folder cannot be written to.
     pub fn begin(self, observer: &mut dyn Observer) -> Result<TrainingSession<'a>> {
-        let Self { gpu, dataset, mut resolved, mut folder, evaluation } = self;
+        let Self { gpu, dataset, mut resolved, mut folder, evaluation, overcommit } = self;
         let Resolved { metadata, plan, test, .. } = &resolved;
         observer.notice(&Event::Resolved { metadata, plan, gpu: &gpu, test_views: test.len() });
-        resolved.check_memory(&gpu, dataset, observer)?;
+        let tested = if evaluation.few(FEW_VIEWS).is_some() { &resolved.test[..] } else { &[] };
+        let memory = resolved.check_memory(&gpu, dataset, tested, overcommit, observer)?;
         if folder.is_unguarded() {
             observer.notice(&Event::Warning(Warning::Unguarded { folder: folder.path() }));
         }
@@ -144,6 +149,7 @@ impl<'a> TrainingRun<'a> {
             is_log_lacking: false,
             loss: None,
             is_empty: false,
+            memory,
         })
     }
 }
@@ -153,6 +159,12 @@ impl TrainingSession<'_> {
     #[must_use]
     pub fn metadata(&self) -> &Metadata {
         &self.metadata
+    }
+
+    /// What it was estimated to take of memory.
+    #[must_use]
+    pub fn memory(&self) -> &MemoryUse {
+        &self.memory
     }
 
     /// The wish to stop.

@@ -1,7 +1,7 @@
 //! The training photos on their way from files to the device.
 
 use super::event::{Event, Observer, Warning};
-use super::memory::MemoryUse;
+use super::memory::{MemoryUse, PhotoUse};
 use crate::camera::Camera;
 use crate::capture::dataset::Dataset;
 use crate::config::Config;
@@ -35,10 +35,18 @@ impl<'a> TrainingPhotos<'a> {
         self.dataset.cameras(self.frames)
     }
 
-    /// What training on them takes of the host's memory and of the device's.
+    /// What training on them takes of the host's memory and of the device's, which the host has too if `is_cpu`. The
+    /// frames `tested` are measured.
     #[must_use]
-    pub fn memory(&self, plan: &Plan) -> MemoryUse {
-        MemoryUse::of_training(plan, &self.cameras(), self.dataset.stream_bytes(self.frames))
+    pub fn memory(&self, plan: &Plan, tested: &[usize], is_cpu: bool) -> MemoryUse {
+        let Self { dataset, frames } = self;
+        let trained = PhotoUse {
+            cameras: &self.cameras(),
+            stream_bytes: dataset.stream_bytes(frames, plan.features.depth),
+        };
+        let tested =
+            PhotoUse { cameras: &dataset.cameras(tested), stream_bytes: dataset.stream_bytes(tested, false) };
+        MemoryUse::of_training(plan, trained, tested, is_cpu)
     }
 
     /// Decodes them, a few at a time, and puts them on the device. Masks, alpha, depth and bits come along as far as

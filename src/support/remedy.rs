@@ -20,6 +20,10 @@ pub enum Remedy {
         /// Or what part of the pixels may be left, in percent.
         percent: u32,
     },
+    /// A field or a batch that takes less.
+    SmallerField,
+    /// What takes less memory, or to begin although it seems not to suffice.
+    OrOvercommit(Box<Self>),
     /// What width and height are divided by.
     Downscale(u32),
     /// Masks that mean the opposite.
@@ -65,6 +69,10 @@ impl fmt::Display for Remedy {
                 "divide their width and height by {downscale}, or take fewer or crop them to leave {percent} % of the \
                  pixels"
             ),
+            Self::SmallerField => {
+                f.write_str("use a smaller table or batch (see configs/cpu.json), or another machine")
+            }
+            Self::OrOvercommit(less) => write!(f, "{less}, or begin all the same"),
             Self::Downscale(by) => write!(f, "a downscale of {by}"),
             Self::InvertMasks => f.write_str("try to invert them"),
             Self::LeaveMasks => f.write_str("do not invert them"),

@@ -35,6 +35,12 @@ fn a_short_training_learns_the_scene() {
     assert!(psnr > GATE_DB, "{psnr} dB");
     assert!(number(&result["ssim"]) > 0.85 && result["steps"] == 1200 && result["views"] == 5);
 
+    let memory = &result["memory"];
+    if memory["peak_bytes"].is_number() && rows(&run)[0]["adapter"].to_string().contains("llvmpipe") {
+        let stated = number(&memory["host_bytes"]) + number(&memory["device_bytes"]);
+        let ratio = stated / number(&memory["peak_bytes"]);
+        assert!((1.0 / 1.5..1.5).contains(&ratio), "{memory}");
+    }
     let rows = rows(&run);
     assert!(rows[0]["event"] == "start" && rows[0]["compile_seconds"].is_number());
     let steps: Vec<&Value> = rows.iter().filter(|row| row.get("loss").is_some()).collect();
@@ -358,7 +364,7 @@ fn a_run_without_a_terminal_tells_what_happens_and_stops_when_asked() {
         };
         let evaluation = EvaluationOptions { every: Some(32), at_end: EvaluationAtEnd::All };
         let resolved = resolved.expect("it fits");
-        let run = TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation };
+        let run = TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation, overcommit: false };
         let mut session = run.begin(listener).expect("it begins");
         let end = session.train(listener).expect("it trains");
         let views = session.evaluate(&end, listener).expect("measured");

@@ -258,10 +258,10 @@ fn frames_stream_in_order_and_stop_at_the_first_failure() {
     };
     dataset.stream(&backwards, false, &mut take).expect("readable");
     assert_eq!(seen, backwards);
-    let bytes = dataset.stream_bytes(&backwards);
+    let bytes = dataset.stream_bytes(&backwards, false);
     let photo = COUNT as u64 * 4;
     assert!((photo..photo * 30 * 4).contains(&bytes), "{bytes}");
-    assert_eq!(dataset.stream_bytes(&[]), 0);
+    assert_eq!(dataset.stream_bytes(&[], false), 0);
     std::fs::write(folder.path("images/7.png"), "gone bad").expect("writable");
     let mut count = 0;
     let failed = dataset.stream(&(0..30).collect::<Vec<_>>(), false, &mut |_, _| {

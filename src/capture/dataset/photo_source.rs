@@ -62,13 +62,13 @@ impl Dataset {
         depth: bool,
         each: &mut dyn FnMut(usize, Photo) -> Result<()>,
     ) -> Result<()> {
-        let bytes: Vec<_> = indices.iter().map(|&index| self.frames[index].decoding_bytes()).collect();
+        let bytes: Vec<_> = indices.iter().map(|&index| self.frames[index].decoding_bytes(depth)).collect();
         prefetch::prefetch(&bytes, &|position| self.load(indices[position], depth), each)
     }
 
     /// Most bytes of host memory that [`Dataset::stream`] takes for these frames.
-    pub fn stream_bytes(&self, indices: &[usize]) -> u64 {
-        let largest = indices.iter().map(|&index| self.frames[index].decoding_bytes()).max();
+    pub fn stream_bytes(&self, indices: &[usize], depth: bool) -> u64 {
+        let largest = indices.iter().map(|&index| self.frames[index].decoding_bytes(depth)).max();
         prefetch::most_bytes(indices.len(), largest.unwrap_or(0))
     }
 }
@@ -169,13 +169,13 @@ impl Frame {
     }
 
     /// Most bytes that loading takes, the photo included.
-    fn decoding_bytes(&self) -> u64 {
+    fn decoding_bytes(&self, with_depth: bool) -> u64 {
         let PhotoSource { stored, sidecars, .. } = &self.source;
         let image = self.bits.decoding_bytes_per_pixel();
         // Beside the decoded picture: a decoded sidecar, a number for each of its pixels, and that at the
         // picture's size.
         let mask = if sidecars.masks.is_empty() { 0 } else { 8 };
-        let depth = if sidecars.depth.is_some() { 16 } else { 0 };
+        let depth = if with_depth && sidecars.depth.is_some() { 16 } else { 0 };
         u64::from(stored[0]) * u64::from(stored[1]) * (image + mask + depth)
     }
 }

@@ -137,7 +137,7 @@ impl Benchmark<'_> {
     fn run(&self, planned: &PlannedRun, session: &Session<'_>) -> Result<MeasuredRun> {
         let resolved = &planned.resolved;
         let mut narrator = session.narrator();
-        resolved.check_memory(&self.gpu, self.dataset, &mut narrator)?;
+        resolved.check_memory(&self.gpu, self.dataset, &resolved.test, false, &mut narrator)?;
         let clock = Instant::now();
         let views = resolved.photos(self.dataset).load(&self.gpu, &resolved.plan, &mut narrator)?;
         let load_seconds = clock.elapsed().as_secs_f64();
