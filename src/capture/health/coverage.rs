@@ -67,10 +67,16 @@ impl Coverage {
                  `aabb`: [[x, y, z], [x, y, z]], the corners of what to show, into the file",
             ));
         } else if !blind.is_empty() {
+            let trained = blind.iter().filter(|index| scene.dataset.train.contains(index)).count();
+            let consequence = match trained {
+                0 => "though their photos are to be measured".to_owned(),
+                all if all == blind.len() => "and are trained on for nothing".to_owned(),
+                some => format!("and {some} of them are trained on for nothing"),
+            };
             findings.push(
                 Diagnostic::warning(format!(
-                    "{} of {} see nothing of the scene box, and are trained on for nothing: {}; check their poses, or \
-                     write a larger box (`aabb`, `aabb_scale`) into the file",
+                    "{} of {} see nothing of the scene box, {consequence}: {}; check their poses, or write a larger box \
+                     (`aabb`, `aabb_scale`) into the file",
                     blind.len(),
                     count(scene.count(), "camera"),
                     scene.names(&blind)
