@@ -95,10 +95,10 @@ impl<'a> Evaluator<'a> {
     ) -> Result<usize> {
         let (clock, dataset) = (Instant::now(), self.dataset);
         let all = indices.len();
-        let mut done = 0;
+        let (mut done, mut measured) = (0, 0);
         observer.notice(&Event::Measuring { done, all });
         loop {
-            let count = affordable(limit, clock.elapsed().as_secs_f64(), done, all - done);
+            let count = affordable(limit, clock.elapsed().as_secs_f64(), measured, all - done);
             if count == 0 {
                 return Ok(done);
             }
@@ -110,6 +110,7 @@ impl<'a> Evaluator<'a> {
                     observer.notice(&Event::Warning(Warning::NotMeasured { name }));
                 } else {
                     take(position, self.compare(index, &photo)?)?;
+                    measured += 1;
                 }
                 observer.notice(&Event::Measuring { done: position + 1, all });
                 Ok(())
