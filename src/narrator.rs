@@ -7,8 +7,8 @@ use nerf::field::checkpoint::Metadata;
 use nerf::field::optimize::accumulation_name;
 use nerf::gpu::Gpu;
 use nerf::run::memory::MemoryUse;
-use nerf::run::{Event, Observer, StepsTaken};
-use nerf::support::format::{bytes, count};
+use nerf::run::{DepthTold, Event, Observer, StepsTaken};
+use nerf::support::format::{bytes, count, percent};
 
 /// Prints events, and shows progress for long ones.
 #[derive(Debug)]
@@ -25,6 +25,7 @@ impl Observer for Narrator {
                 self.describe(metadata, plan, gpu, test_views);
             }
             Event::Memory(memory) => self.say(&memory_line(&memory)),
+            Event::Depth(told) => self.say(&depth_line(&told)),
             Event::Loading { done, all } => self.count("loading", (done, all), "images"),
             Event::Steps(taken) => {
                 self.progress("training").update(taken.spent, || steps_line(&taken));
@@ -102,6 +103,15 @@ impl Narrator {
             from
         ));
         self.console.say(&format!("left out: {}", plan.left_out().join(", ")));
+    }
+}
+
+fn depth_line(told: &DepthTold) -> String {
+    let photos = count(told.photos, "photo");
+    let known = format!("depth: known in {} of the pixels of {photos}", percent(told.known));
+    match told.far {
+        0.0 => known,
+        far => format!("{known}; {} of the values stand for far away and are not trained on", percent(far)),
     }
 }
 

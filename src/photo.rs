@@ -22,6 +22,9 @@ pub struct Photo {
     /// Depth in world units as the lens defines it (along the view axis for pinholes), `[height * width]`, 0
     /// where it is unknown; empty where the frame has none or it was not asked for.
     pub depth: Vec<f32>,
+    /// Part of the values of the depth file that stand for far away, which is unknown: infinite, the largest number that
+    /// the file can hold, or beyond the scene box by far.
+    pub far_depth: f64,
 }
 
 impl Photo {
@@ -38,7 +41,7 @@ impl Photo {
 
 impl From<Image> for Photo {
     fn from(image: Image) -> Self {
-        Self { image, ignored: Vec::new(), depth: Vec::new() }
+        Self { image, ignored: Vec::new(), depth: Vec::new(), far_depth: 0.0 }
     }
 }
 
@@ -49,3 +52,8 @@ pub(crate) fn nothing_counts(photos: usize, inverts: bool) -> Advised {
     let remedy = if inverts { Remedy::LeaveMasks } else { Remedy::InvertMasks };
     Advised::new(found, remedy, "")
 }
+
+/// What keeps training with depth from beginning where no photo has any.
+pub(crate) const NO_DEPTH_KNOWN: &str = "no pixel of the training photos has a known depth: all values are 0, negative, not \
+                                         finite, the largest that their files can hold, or beyond the scene box by far; \
+                                         check their units";

@@ -33,7 +33,7 @@ mod training_photos;
 pub use clock::StepClock;
 pub use estimate::Estimate;
 pub use evaluate::{Compared, Evaluator};
-pub use event::{Event, Observer, StepsTaken, Warning};
+pub use event::{DepthTold, Event, Observer, StepsTaken, Warning};
 pub use folder::RunFolder;
 pub use log_writer::LogWriter;
 pub use options::{EvaluationAtEnd, EvaluationOptions, TrainOptions};

@@ -4,6 +4,7 @@
 //! dataset's own, in its own units.
 
 mod alpha_probe;
+mod depth;
 mod file_names;
 mod folders;
 mod guesses;
@@ -34,7 +35,7 @@ use crate::capture::diagnostics::Diagnostic;
 use crate::capture::focus;
 use crate::photo::{BitDepth, Reading, Split};
 pub use intrinsics::Intrinsics;
-pub use listing::{DepthEntry, FrameEntry, Listing, SceneBox};
+pub use listing::{DepthEntry, DepthScale, FrameEntry, Listing, SceneBox};
 pub use open::read_cameras;
 pub use splits::{HoldOut, evenly_spaced, spread_order};
 

@@ -5,6 +5,7 @@
 
 mod axis_convention;
 mod coverage;
+pub mod depth;
 pub mod gallery;
 pub mod map;
 mod optics;

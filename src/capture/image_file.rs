@@ -5,6 +5,7 @@ mod decode;
 mod depth;
 mod jpeg;
 mod mask;
+mod npy;
 mod open_exr;
 mod pixel_grid;
 mod reduce;

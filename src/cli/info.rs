@@ -19,6 +19,12 @@ pub(crate) struct Info {
     /// Without a test split, keep every N-th frame for testing, or none
     #[arg(long, value_name = "N|none", default_value = "8", value_parser = super::hold_out)]
     pub(crate) hold_out: HoldOut,
+    /// Settings of the training to look ahead to, as `nerf train` takes them: a JSON file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// A single setting, for example loss.depth=1; may be repeated
+    #[arg(long, value_name = "KEY.PATH=VALUE")]
+    pub(crate) set: Vec<String>,
     /// How photos are read.
     #[command(flatten)]
     pub(crate) reading: PhotoFlags,

@@ -12,10 +12,13 @@ use anyhow::Result;
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::diagnostics::{Diagnostic, Severity};
 use nerf::capture::health::Survey;
+use nerf::capture::health::depth::DepthSurvey;
 use nerf::capture::health::gallery::{Gallery, Look};
 use nerf::capture::health::map;
+use nerf::config::Config;
+use nerf::gpu::Gpu;
 use nerf::photo::Reading;
-use nerf::run::Estimate;
+use nerf::run::{Estimate, TrainOptions};
 use nerf::support::file::write_atomically;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -30,6 +33,8 @@ struct Preflight<'a> {
     survey: Survey,
     /// `None` where the photos were not looked at.
     gallery: Option<Gallery>,
+    /// `None` where the photos were not looked at, or have no depth.
+    depth: Option<DepthSurvey>,
     /// `None` where there is nothing to train on.
     memory: Option<Estimate>,
     /// Worst first.
@@ -77,17 +82,41 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
     }
     problems.extend(survey.findings_with(gallery.as_ref(), dataset));
     let mut memory = None;
+    let mut is_depth_used = false;
     if !dataset.train.is_empty() {
         // An adapter that was asked for must be there.
         let gpu = match session.open_gpu() {
             Err(error) if session.global.adapter.is_some() => return Err(error),
             opened => opened.ok(),
         };
-        let estimate = Estimate::of(dataset, gpu.as_deref())?;
-        problems.extend(problems::of_memory(&estimate));
-        memory = Some(estimate);
+        let config = config(args, dataset, gpu.as_deref())?;
+        is_depth_used = config.loss.depth > 0.0;
+        match Estimate::of(dataset, gpu.as_deref(), config) {
+            Ok(estimate) => {
+                problems.extend(problems::of_memory(&estimate));
+                memory = Some(estimate);
+            }
+            Err(error) => problems.push(Diagnostic::error(with_flags(&error))),
+        }
     }
-    Ok(Preflight { args, dataset, survey, gallery, memory, problems })
+    let has_depth = dataset.frames.iter().any(|frame| frame.has_depth);
+    let depth = (has_depth && gallery.is_some()).then(|| look_at_depth(dataset, &survey.views, session));
+    problems.extend(depth.iter().flat_map(|depth| depth.findings(dataset, is_depth_used)));
+    Ok(Preflight { args, dataset, survey, gallery, depth, memory, problems })
+}
+
+/// The settings that training would have.
+fn config(args: &Info, dataset: &Dataset, gpu: Option<&Gpu>) -> Result<Config> {
+    let options =
+        TrainOptions { config: args.config.clone(), set: args.set.clone(), ..TrainOptions::default() };
+    options.configure(Config::for_dataset(dataset, gpu.is_some_and(Gpu::is_cpu))?)
+}
+
+/// Reads all depth files, in parallel.
+fn look_at_depth(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> DepthSurvey {
+    let views: Vec<usize> = views.iter().copied().filter(|&index| dataset.frames[index].has_depth).collect();
+    let progress = Progress::new(session.console, "looking");
+    DepthSurvey::of(dataset, &views, &|done| progress.count(done, views.len(), "depth files"))
 }
 
 /// Decodes all photos, in parallel, and keeps what matters of each.

@@ -9,6 +9,7 @@ use anyhow::{Context, Result};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::diagnostics::Severity;
 use nerf::capture::health::Survey;
+use nerf::capture::health::depth::DepthSurvey;
 use nerf::config::schedule::Budget;
 use nerf::field::checkpoint::{Checkpoint, Metadata};
 use nerf::run::memory::peak_bytes;
@@ -29,6 +30,9 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         None => Resolved::new_run(&options, &dataset, &gpu)?,
         Some(checkpoint) => Resolved::resume(&options, &dataset, &gpu, checkpoint)?,
     };
+    if resolved.metadata.config.loss.depth > 0.0 {
+        warn_of_depth(&dataset, &resolved.train, session);
+    }
     let evaluation = EvaluationOptions {
         every: args.eval_every,
         at_end: match (args.no_eval, args.eval_all) {
@@ -111,6 +115,18 @@ fn open(args: &Train, checkpoint: Option<&Checkpoint>, session: &Session<'_>) ->
         session.console.warn(&message_with_flags(&finding.message, finding.remedy.as_ref()));
     }
     Ok(dataset)
+}
+
+/// Says what looks wrong with the depth that is trained on, of a few frames; what fails is told on loading.
+fn warn_of_depth(dataset: &Dataset, train: &[usize], session: &Session<'_>) {
+    let with_depth: Vec<usize> =
+        train.iter().copied().filter(|&index| dataset.frames[index].has_depth).collect();
+    let survey = DepthSurvey::of_few(dataset, &with_depth);
+    for finding in survey.findings(dataset, true) {
+        if finding.severity == Severity::Warning {
+            session.console.warn(&finding.message);
+        }
+    }
 }
 
 fn options(args: &Train) -> TrainOptions {

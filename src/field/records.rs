@@ -90,7 +90,7 @@ impl Record {
     /// Whether a record holds all channels of the photo. Without positions a pixel's record is found by its number, so
     /// that one left out would move all behind it; without alpha what is transparent would be trained on as it is stored.
     fn check(&self, photo: &Photo) -> Result<()> {
-        let Photo { image, ignored, depth } = photo;
+        let Photo { image, ignored, depth, .. } = photo;
         let count = image.width as usize * image.height as usize;
         let pixels = image.pixels.count();
         ensure!(
@@ -189,7 +189,12 @@ mod tests {
     use crate::photo::Image;
 
     fn photo(pixels: Pixels, ignored: Vec<bool>, depth: Vec<f32>) -> Photo {
-        Photo { image: Image { width: 2, height: 1, pixels, has_alpha: true }, ignored, depth }
+        Photo {
+            image: Image { width: 2, height: 1, pixels, has_alpha: true },
+            ignored,
+            depth,
+            far_depth: 0.0,
+        }
     }
 
     const UNITS: Units = Units { color: 0.5, depth: 2.0 };

@@ -29,13 +29,14 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// For a training run on the training frames of `dataset` on `gpu`, or on a usual GPU where there is none.
+    /// For a training run with these settings on the training frames of `dataset`, on `gpu` or on a usual GPU where there
+    /// is none.
     ///
     /// # Errors
     /// When the settings ask for what the photos do not have.
-    pub fn of(dataset: &Dataset, gpu: Option<&Gpu>) -> Result<Self> {
+    pub fn of(dataset: &Dataset, gpu: Option<&Gpu>, config: Config) -> Result<Self> {
         let adapter = gpu.map_or(Capabilities::GPU, Capabilities::of);
-        let config = Config::for_dataset(dataset, adapter.is_cpu)?.with_finest(dataset);
+        let config = config.with_finest(dataset);
         let features = SceneFeatures::of_headers(dataset, &config)?;
         let plan = Plan::suited_to(adapter, config, features, Space::from(&dataset.bounds));
         let memory = TrainingPhotos::of(dataset).memory(&plan, &dataset.test, adapter.is_cpu);

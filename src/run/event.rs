@@ -6,6 +6,7 @@ use super::stepper::Block;
 use crate::field::Plan;
 use crate::field::checkpoint::Metadata;
 use crate::gpu::Gpu;
+use crate::photo::Photo;
 use crate::support::format::{bytes, count, few};
 use std::fmt;
 use std::path::Path;
@@ -37,6 +38,8 @@ pub enum Event<'a> {
     },
     /// What the run takes of the memory, before it is taken.
     Memory(MemoryUse),
+    /// Photos with depth are on the device.
+    Depth(DepthTold),
     /// So many training photos are on the device.
     Loading {
         /// So many, from 0 on.
@@ -71,6 +74,31 @@ pub enum Event<'a> {
     },
     /// Something that probably makes results worse.
     Warning(Warning<'a>),
+}
+
+/// How much the depth files of the training photos tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DepthTold {
+    /// Number of photos with depth.
+    pub photos: usize,
+    /// Mean part of their pixels whose depth is known, within `[0, 1]`.
+    pub known: f64,
+    /// Mean part of their files' values that stand for far away, and are unknown.
+    pub far: f64,
+}
+
+impl DepthTold {
+    /// Counts a photo in, if it has depth.
+    pub(super) fn add(&mut self, photo: &Photo) {
+        if photo.depth.is_empty() {
+            return;
+        }
+        let known = photo.depth.iter().filter(|depth| **depth > 0.0).count() as f64;
+        self.photos += 1;
+        let share = 1.0 / self.photos as f64;
+        self.known += share * (known / photo.depth.len() as f64 - self.known);
+        self.far += share * (photo.far_depth - self.far);
+    }
 }
 
 /// A block of steps, and how far the run is after it.

@@ -1,6 +1,6 @@
 //! The training photos on their way from files to the device.
 
-use super::event::{Event, Observer, Warning};
+use super::event::{DepthTold, Event, Observer, Warning};
 use super::memory::{MemoryUse, PhotoUse};
 use crate::camera::Camera;
 use crate::capture::dataset::Dataset;
@@ -9,7 +9,7 @@ use crate::field::trainer::Trainer;
 use crate::field::training_views::TrainingViews;
 use crate::field::{Field, Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
-use crate::photo::nothing_counts;
+use crate::photo::{NO_DEPTH_KNOWN, nothing_counts};
 use anyhow::{Result, ensure};
 use std::sync::Arc;
 
@@ -60,6 +60,7 @@ impl<'a> TrainingPhotos<'a> {
         let mut views = TrainingViews::new(gpu, plan, &self.cameras())?;
         let mut ignored = Vec::new();
         let mut ignored_pixels = 0;
+        let mut depths = DepthTold::default();
         observer.notice(&Event::Loading { done: 0, all: frames.len() });
         dataset.stream(frames, plan.features.depth, &mut |position, photo| {
             ignored_pixels += photo.count_ignored();
@@ -67,6 +68,7 @@ impl<'a> TrainingPhotos<'a> {
                 ignored.push(dataset.frames[frames[position]].name.as_str());
             }
             gpu.interrupt.check()?;
+            depths.add(&photo);
             views.add(&photo)?;
             observer.notice(&Event::Loading { done: position + 1, all: frames.len() });
             Ok(())
@@ -75,6 +77,10 @@ impl<'a> TrainingPhotos<'a> {
         let masks = frames.iter().filter(|&&index| dataset.frames[index].has_mask).count();
         if masks > 0 && ignored_pixels == 0 {
             observer.notice(&Event::Warning(Warning::UselessMasks { masks }));
+        }
+        if plan.features.depth {
+            ensure!(depths.known > 0.0, "loss.depth is above 0, and {NO_DEPTH_KNOWN}");
+            observer.notice(&Event::Depth(depths));
         }
         if !ignored.is_empty() {
             let warning = Warning::IgnoredPhotos { names: &ignored, all: frames.len() };

@@ -1,5 +1,6 @@
 //! `nerf info`: healthy datasets raise no alarm, and each kind of damage is named with what to do.
 
+mod depth;
 mod files;
 mod masks;
 mod toys;

@@ -49,9 +49,17 @@ impl Listing {
 pub struct DepthEntry {
     /// The file, as the frame spells it, with forward slashes.
     pub path: String,
-    /// World units per step of a file of whole numbers; `None` if the file does not say. Files of floats are
-    /// in world units already.
-    pub world_per_unit: Option<f64>,
+    /// What its numbers mean.
+    pub scale: DepthScale,
+}
+
+/// What the numbers of a depth file mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthScale {
+    /// World units per step of a file of whole numbers; `None` if the dataset does not say.
+    pub steps: Option<f64>,
+    /// World units per unit of a file of floats.
+    pub lengths: f64,
 }
 
 /// A scene box in instant-ngp's terms: `world * scale + offset` maps the inner cube to `[0, 1]³`.

@@ -1,11 +1,10 @@
 //! One frame's pixels: decoded, masked, turned, cropped and reduced to the size of its camera.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 
-use super::sidecars::{Depth, Sidecars};
+use super::sidecars::Sidecars;
 use super::{Dataset, Frame, prefetch};
-use crate::capture::image_file::load_depth;
-use crate::capture::image_file::{Multiplied, Turn, Window, crop, nearest, reduce_any, reduce_depth};
+use crate::capture::image_file::{Multiplied, Turn, Window, crop, nearest, reduce_any};
 use crate::photo::{AlphaMode, Photo, Reading};
 use crate::photo::{BitDepth, Image};
 
@@ -47,7 +46,9 @@ impl Dataset {
     /// # Errors
     /// When a file cannot be read, is damaged, or has changed since the dataset was opened; the message names it.
     pub fn load(&self, index: usize, depth: bool) -> Result<Photo> {
-        self.frames[index].load(How::new(self.bit_depth, &self.reading), depth)
+        let frame = &self.frames[index];
+        let reach = depth.then(|| self.reach(frame));
+        frame.load(How::new(self.bit_depth, &self.reading), reach)
     }
 
     /// Decodes frames in parallel and hands them over one at a time, in their order, with their position in
@@ -74,7 +75,8 @@ impl Dataset {
 }
 
 impl Frame {
-    pub(super) fn load(&self, how: How, depth: bool) -> Result<Photo> {
+    /// Decodes the photo, with the depth up to somewhat beyond `reach` world units if that is asked for.
+    fn load(&self, how: How, reach: Option<f64>) -> Result<Photo> {
         let size = [self.camera.width, self.camera.height];
         let mut image = self.upright(how)?.cropped(self.source.window);
         if how.bits == BitDepth::Sixteen {
@@ -84,11 +86,13 @@ impl Frame {
             image = image.reduced(size);
         }
         let ignored = self.ignored(how.invert_masks)?;
-        let depth = match &self.source.sidecars.depth {
-            Some(file) if depth => self.depth(file)?,
-            _ => Vec::new(),
+        let (depth, far_depth) = match (&self.source.sidecars.depth, reach) {
+            (Some(file), Some(reach)) => {
+                self.depth(file.load(self.source.stored, self.source.upright_size())?, reach)
+            }
+            _ => (Vec::new(), 0.0),
         };
-        Ok(Photo { image, ignored, depth })
+        Ok(Photo { image, ignored, depth, far_depth })
     }
 
     /// The whole picture, turned, as its pixels are to be understood.
@@ -136,27 +140,8 @@ impl Frame {
         Ok(reduce_any(&all, self.source.window.size, [self.camera.width, self.camera.height]))
     }
 
-    /// Depth at the camera's size.
-    fn depth(&self, file: &Depth) -> Result<Vec<f32>> {
-        let map = load_depth(&file.path)?;
-        let scale = if map.is_integer { file.world_per_unit } else { Some(1.0) };
-        let show = file.path.display();
-        let scale = scale.with_context(|| {
-            format!(
-                "{show} has whole numbers, and no `integer_depth_scale` says how long a step is; state it"
-            )
-        })?;
-        let known = |depth: f32| {
-            let depth = (f64::from(depth) * scale) as f32;
-            if depth.is_finite() && depth > 0.0 { depth } else { 0.0 }
-        };
-        let depth = map.values.into_iter().map(known).collect();
-        let depth = self.fitted(depth, [map.width, map.height]);
-        Ok(reduce_depth(&depth, self.source.window.size, [self.camera.width, self.camera.height]))
-    }
-
     /// The values of a sidecar of `size` on the part of the picture that is used.
-    fn fitted<T: Copy>(&self, values: Vec<T>, size: [u32; 2]) -> Vec<T> {
+    pub(super) fn fitted<T: Copy>(&self, values: Vec<T>, size: [u32; 2]) -> Vec<T> {
         let PhotoSource { stored, turn, window, .. } = &self.source;
         let is_wide = |[width, height]: [u32; 2]| width > height;
         // One that was made of the turned picture needs no turn.

@@ -17,10 +17,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
+use super::depth::DepthFile;
 use super::file_names::with_extensions;
 use super::guesses::Guesses;
 use super::json::Fields;
-use super::listing::{DepthEntry, FrameEntry};
+use super::listing::{DepthEntry, DepthScale, FrameEntry};
 use super::mask::{Ignores, Mask};
 use super::notes::Notes;
 use super::search::{Found, Role, Search};
@@ -34,7 +35,7 @@ pub(super) struct Sidecars {
     pub(super) masks: Vec<Mask>,
     /// An image whose red channel is the photo's alpha.
     pub(super) alpha: Option<PathBuf>,
-    pub(super) depth: Option<Depth>,
+    pub(super) depth: Option<DepthFile>,
 }
 
 impl Sidecars {
@@ -46,14 +47,6 @@ impl Sidecars {
     }
 }
 
-/// A depth map's file.
-#[derive(Clone, Debug)]
-pub(super) struct Depth {
-    pub(super) path: PathBuf,
-    /// World units per step of whole numbers, where that is known.
-    pub(super) world_per_unit: Option<f64>,
-}
-
 /// What a frame lists: its mask, and its depth.
 pub(super) fn listed(frame: Fields, file: Fields) -> Result<(Option<String>, Option<DepthEntry>)> {
     let name = |key| Ok::<_, anyhow::Error>(frame.text(key)?.map(|path| path.replace('\\', "/")));
@@ -61,15 +54,20 @@ pub(super) fn listed(frame: Fields, file: Fields) -> Result<(Option<String>, Opt
         let in_frame = frame.positive(key, f64::INFINITY)?;
         Ok::<_, anyhow::Error>(in_frame.or(file.positive(key, f64::INFINITY)?))
     };
-    // Datasets for dense depth priors state the steps per world unit instead.
-    let stated = match positive("depth_unit_scale_factor")? {
+    // nerfstudio's factor is for all numbers, the others are for whole ones; datasets for dense depth priors state the
+    // steps per world unit instead.
+    let factor = positive("depth_unit_scale_factor")?;
+    let stated = match factor {
         None => positive("depth_scaling_factor")?.map(f64::recip).or(positive("integer_depth_scale")?),
         stated => stated,
     };
+    let lengths = factor.unwrap_or(1.0);
     let depth = match (name("depth_file_path")?, name("depth_path")?) {
         // nerfstudio's depth is in millimetres unless the file says otherwise.
-        (Some(path), _) => Some(DepthEntry { path, world_per_unit: stated.or(Some(1e-3)) }),
-        (None, Some(path)) => Some(DepthEntry { path, world_per_unit: stated }),
+        (Some(path), _) => {
+            Some(DepthEntry { path, scale: DepthScale { steps: stated.or(Some(1e-3)), lengths } })
+        }
+        (None, Some(path)) => Some(DepthEntry { path, scale: DepthScale { steps: stated, lengths } }),
         (None, None) => None,
     };
     Ok((name("mask_path")?, depth))
@@ -194,18 +192,18 @@ impl<'a> Finder<'a> {
         [long, short].into_iter().find(|path| self.is_there(path))
     }
 
-    fn depth(&mut self, entry: &FrameEntry, notes: &mut Notes) -> Option<Depth> {
+    fn depth(&mut self, entry: &FrameEntry, notes: &mut Notes) -> Option<DepthFile> {
         let listed = entry.depth.as_ref()?;
         let path = self.listed((&listed.path, Role::Depth), "its depth file is missing", entry, notes)?;
         // A header that cannot be read is one of a TIFF with a single channel of floats, or comes up on loading.
         let counts_steps = || Header::read(&path).is_ok_and(|header| header.bits != BitDepth::Float);
-        if listed.world_per_unit.is_none() && counts_steps() {
+        if listed.scale.steps.is_none() && counts_steps() {
             let message = "the depth file has whole numbers, but no `integer_depth_scale` says how long a step \
                            is; it is not used";
             notes.frame(Severity::Warning, &entry.label, message);
             return None;
         }
-        Some(Depth { path, world_per_unit: listed.world_per_unit })
+        Some(DepthFile { path, scale: listed.scale })
     }
 
     fn is_there(&mut self, path: &Path) -> bool {

@@ -43,6 +43,7 @@ impl Preflight<'_> {
             },
             "gaze": self.view_directions(),
             "photos": self.photos(),
+            "depth": self.depth(),
             "memory": self.memory_json(),
             "left_out": self.memory.as_ref().map(|estimate| &estimate.left_out),
             "problems": self.problems.iter().map(|problem| self.problem(problem)).collect::<Vec<_>>(),
@@ -115,6 +116,17 @@ impl Preflight<'_> {
             "brightness": gallery.brightness(),
             "ignored_by_masks": gallery.ignored_part(self.dataset),
             "ignored_of_masked": gallery.ignored(self.dataset),
+        }))
+    }
+
+    fn depth(&self) -> Option<Value> {
+        let depth = self.depth.as_ref()?;
+        Some(json!({
+            "files": depth.looks.len(),
+            "unusable": depth.failures.len(),
+            "known": depth.known(),
+            "far": depth.far(),
+            "range": depth.range(),
         }))
     }
 

@@ -25,6 +25,7 @@ impl Preflight<'_> {
             ("views", about_view_directions(&self.survey.directions, self.survey.views.len())),
             ("photos", self.about_photos()),
             ("masks", self.about_masks()),
+            ("depth", self.about_depth()),
             ("memory", self.memory.as_ref().map_or_else(Vec::new, about_memory)),
             ("left out", self.about_left_out()),
         ];
@@ -177,6 +178,22 @@ impl Preflight<'_> {
         let part = percent(gallery.ignored_part(self.dataset).unwrap_or(0.0));
         let each = gallery.ignored(self.dataset).describe(percent);
         vec![format!("ignore {part} of all pixels; {each} of a photo with a mask")]
+    }
+
+    fn about_depth(&self) -> Vec<String> {
+        let Some(depth) = self.depth.as_ref().filter(|depth| !depth.looks.is_empty()) else {
+            return Vec::new();
+        };
+        let mut line = format!(
+            "{} read; known in {} of the pixels, {}",
+            count(depth.looks.len(), "file"),
+            percent(depth.known()),
+            depth.range().describe(length)
+        );
+        if depth.far() > 0.0 {
+            line += &format!("; {} of the values stand for far away, unknown", percent(depth.far()));
+        }
+        vec![line]
     }
 
     fn about_left_out(&self) -> Vec<String> {
