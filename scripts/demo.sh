@@ -8,6 +8,26 @@ fail() {
     exit "${2:-1}"
 }
 
+stop() {
+    [ -n "$running" ] || exit "$2"
+    kill "-$1" "$running" 2>/dev/null || true
+}
+
+# Runs a command, to which signals to this script go on, and ends as it does where it fails.
+run() {
+    local code=0
+    "$@" &
+    running=$!
+    wait "$running" || code=$?
+    # A signal ends the wait, not the command.
+    while kill -0 "$running" 2>/dev/null; do
+        code=0
+        wait "$running" || code=$?
+    done
+    running=
+    [ "$code" -eq 0 ] || exit "$code"
+}
+
 out=demo
 seconds=60
 overwrite=
@@ -42,9 +62,13 @@ touch "$out/.nerf-demo"
 rm -rf "$out/dataset" "$out/run" "$out/views"
 nerf=${CARGO_TARGET_DIR:-target}/release/nerf
 
-"$nerf" generate toys --out "$out/dataset"
-"$nerf" train "$out/dataset" --out "$out/run" --seconds "$seconds"
-"$nerf" render "$out/run" --out "$out/views" --orbit 24 --format png --format exr
+running=
+trap 'stop INT 130' INT
+trap 'stop TERM 143' TERM
+trap 'stop HUP 129' HUP
+run "$nerf" generate toys --out "$out/dataset"
+run "$nerf" train "$out/dataset" --out "$out/run" --seconds "$seconds"
+run "$nerf" render "$out/run" --out "$out/views" --orbit 24 --format png --format exr
 
 cat <<END
 
