@@ -8,7 +8,7 @@ use super::{Failed, Session};
 use crate::cli::info::Info;
 use crate::flags::{message_with_flags, with_flags};
 use crate::progress::Progress;
-use anyhow::Result;
+use anyhow::{Error, Result};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::capture::diagnostics::{Diagnostic, Severity};
 use nerf::capture::health::Survey;
@@ -20,6 +20,7 @@ use nerf::gpu::Gpu;
 use nerf::photo::Reading;
 use nerf::run::{Estimate, TrainOptions};
 use nerf::support::file::write_atomically;
+use nerf::support::transient::is_transient;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::io::Write;
@@ -49,7 +50,7 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
     };
     let dataset = match Dataset::open(&args.dataset, &options) {
         Ok(dataset) => dataset,
-        Err(error) => return unreadable(args, &with_flags(&error), session),
+        Err(error) => return unreadable(args, error, session),
     };
     let mut report = inspect(args, &dataset, session)?;
     for problem in &mut report.problems {
@@ -76,7 +77,7 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
     problems.extend(survey.findings.iter().cloned());
     let mut gallery = None;
     if !args.no_photos && problems::found(dataset) > 0 {
-        let (all, failures) = look(dataset, &survey.views, session);
+        let (all, failures) = look(dataset, &survey.views, session)?;
         problems.extend(failures);
         gallery = Some(all);
     }
@@ -119,24 +120,33 @@ fn look_at_depth(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> D
     DepthSurvey::of(dataset, &views, &|done| progress.count(done, views.len(), "depth files"))
 }
 
-/// Decodes all photos, in parallel, and keeps what matters of each.
-fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> (Gallery, Vec<Diagnostic>) {
+/// Decodes all photos, in parallel, and keeps what matters of each, or why it cannot be trained on.
+fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> Result<(Gallery, Vec<Diagnostic>)> {
     let progress = Progress::new(session.console, "looking");
     let done = AtomicUsize::new(0);
-    let looks: Vec<_> = (views.par_iter())
+    let looks: Result<Vec<_>> = (views.par_iter())
         .map(|&index| {
+            session.check_interrupt()?;
             let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
             progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
-            look.map_err(|error| Diagnostic::error(with_flags(&error)).about(vec![index]))
+            match look {
+                Err(error) if is_transient(&error) => Err(error),
+                Err(error) => Ok(Err(Diagnostic::error(with_flags(&error)).about(vec![index]))),
+                Ok(look) => Ok(Ok(look)),
+            }
         })
         .collect();
-    let (looks, failures): (Vec<_>, Vec<_>) = looks.into_iter().partition(Result::is_ok);
+    let (looks, failures): (Vec<_>, Vec<_>) = looks?.into_iter().partition(Result::is_ok);
     let looks = looks.into_iter().filter_map(Result::ok).collect();
-    (Gallery { looks }, failures.into_iter().filter_map(Result::err).collect())
+    Ok((Gallery { looks }, failures.into_iter().filter_map(Result::err).collect()))
 }
 
 /// The result for what cannot even be opened.
-fn unreadable(args: &Info, message: &str, session: &Session<'_>) -> Result<()> {
+fn unreadable(args: &Info, error: Error, session: &Session<'_>) -> Result<()> {
+    if !session.global.json {
+        return Err(error);
+    }
+    let message = with_flags(&error);
     let result = json!({
         "dataset": args.dataset.display().to_string(),
         "ok": false,
@@ -149,6 +159,6 @@ fn unreadable(args: &Info, message: &str, session: &Session<'_>) -> Result<()> {
         "problems": [{ "severity": Severity::Error, "message": message }],
         "error": message,
     });
-    session.print(&result, &format!("error    {message}"))?;
-    Err(Failed(message.to_owned()).into())
+    session.print(&result, "")?;
+    Err(error)
 }
