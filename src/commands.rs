@@ -15,7 +15,7 @@ use crate::cli::{Cli, Command, Global};
 use crate::console::Console;
 use crate::narrator::Narrator;
 use crate::signals::Signals;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::field::checkpoint::Metadata;
 use nerf::gpu::{Gpu, adapter};
@@ -106,11 +106,11 @@ impl Session<'_> {
     fn print(&self, json: &Value, text: &str) -> Result<()> {
         self.signals.claim_answer();
         let mut out = std::io::stdout().lock();
-        match self.global.json {
-            true => writeln!(out, "{json}")?,
-            false => writeln!(out, "{text}")?,
-        }
-        Ok(out.flush()?)
+        let printed = match self.global.json {
+            true => writeln!(out, "{json}"),
+            false => writeln!(out, "{text}"),
+        };
+        printed.and_then(|()| out.flush()).context("the result could not be printed")
     }
 }
 

@@ -83,7 +83,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
         Err(error) => session.console.warn(&format!("{}{}", saved(), with_flags(&error))),
     }
     result["memory"]["peak_bytes"] = json!(peak_bytes());
-    session.print(&result, &text).with_context(|| saved() + "its result could not be printed")?;
+    session.print(&result, &text).with_context(|| format!("the run is saved to {folder}"))?;
     if is_interrupted {
         return session.check_interrupt();
     }

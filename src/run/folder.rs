@@ -177,7 +177,8 @@ impl RunFolder {
     pub fn begin(&self, config: &Config, resumed: Option<u32>) -> Result<LogWriter> {
         if resumed.is_none() {
             for name in [Self::CHECKPOINT, Self::LOG, Self::CONFIG, Self::REPORT] {
-                remove(&self.path.join(name))?;
+                // A link stays, to be written through.
+                remove(&behind_links(&self.path.join(name))?)?;
             }
         }
         write_json(&self.path.join(Self::CONFIG), config)?;
@@ -219,6 +220,14 @@ mod tests {
         assert!(!run.report().exists() && folder.path().join("notes.txt").exists());
         assert!(run.config().is_some_and(|text| text.contains("\"grid\"")));
         assert_eq!(RunFolder::find(&run.path.join(RunFolder::LOG)).expect("there").path, run.path);
+        #[cfg(unix)]
+        {
+            let target = run.path.join("elsewhere");
+            std::os::unix::fs::symlink("elsewhere", run.report()).expect("a link");
+            fs::write(&target, "earlier").expect("writable");
+            run.begin(&Config::default(), None).expect("writable");
+            assert!(run.report().is_symlink() && !target.exists(), "what it leads to is replaced");
+        }
         fs::remove_dir_all(&run.path).expect("removable");
         assert!(run.make_again(&Config::default()).expect("writable") && run.config().is_some());
         assert!(!run.make_again(&Config::default()).expect("writable"), "it is there");

@@ -1,6 +1,8 @@
 //! Signals and exit codes: what a terminal, a script or a scheduler does to the program, and what it learns from it.
 
 use crate::program::{SMOKE, checkpoint, generated, place, text};
+use nerf::gpu::{Gpu, adapter};
+use nerf::support::transient::is_transient;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -108,7 +110,8 @@ fn a_signal_while_loading_leaves_nothing() {
             assert_eq!(answer["error"], "interrupted by SIGTERM");
         }
     }
-    assert!(!run.exists());
+    let left = whole_files(&run);
+    assert!(left.iter().all(|file| file.ends_with(".nerf-lock")), "{left:?}");
 }
 
 #[test]
@@ -124,8 +127,9 @@ fn signals_while_measuring_and_rendering() {
     assert_eq!((&result["steps"], &result["interrupted"]), (&20.into(), &true.into()), "{said}");
     assert!(whole_files(&run).contains(&run.join("report.html")));
 
-    let eval = ["eval", text(&run), text(&large), "--save", text(&saved), "--quiet"];
-    let running = Running::nerf(&eval).until(is_there(saved.join("0000.png")));
+    let eval = ["eval", text(&run), text(&large), "--split", "train", "--save", text(&saved), "--quiet"];
+    let has_pictures = || std::fs::read_dir(&saved).is_ok_and(|files| files.count() > 1);
+    let running = Running::nerf(&eval).until(has_pictures);
     let ended = running.signal("INT").end();
     assert_eq!(ended, (Some(130), String::new(), "error: interrupted by SIGINT\n".to_owned()));
 
@@ -216,8 +220,7 @@ fn full_disks_are_worth_another_try() {
     };
     let (code, said, errors) = Running::start(script("exec \"$0\" \"$@\" > /dev/full").args(args)).end();
     assert_eq!((code, said.as_str()), (Some(3), ""));
-    let expected =
-        format!("error: the run is saved to {}, but its result could not be printed", run.display());
+    let expected = format!("error: the run is saved to {}: the result could not be printed: ", run.display());
     assert!(errors.starts_with(&expected) && errors.lines().count() == 1, "{errors}");
     assert_eq!(checkpoint(&run).metadata.step, 16);
 
@@ -226,8 +229,16 @@ fn full_disks_are_worth_another_try() {
     let (code, _, errors) = Running::start(script("ulimit -f 100; exec \"$0\" \"$@\"").args(generate)).end();
     assert_eq!(code, Some(3), "{errors}");
     let (code, _, errors) =
-        Running::start(script("ulimit -n 9; exec \"$0\" \"$@\"").args(["info", text(&TOYS)])).end();
+        Running::start(script("ulimit -n 5; exec \"$0\" \"$@\"").args(["info", text(&TOYS)])).end();
     assert_eq!(code, Some(3), "{errors}");
     let (code, _, errors) = Running::nerf(&["info", text(&dataset.join("missing"))]).end();
     assert_eq!(code, Some(1), "{errors}");
+}
+
+#[test]
+fn a_lost_device_is_worth_another_try() {
+    let gpu = Gpu::open(&adapter::choose(None).expect("an adapter")).expect("it opens");
+    gpu.device.destroy();
+    let lost = gpu.wait().and_then(|()| gpu.check()).expect_err("it is gone");
+    assert!(is_transient(&lost), "{lost:#}");
 }

@@ -360,7 +360,7 @@ fn a_run_without_a_terminal_tells_what_happens_and_stops_when_asked() {
             Ok((folder, checkpoint)) => (folder, Resolved::resume(&options, &dataset, &gpu, checkpoint)),
             Err(_) => (RunFolder::unused(&path).expect("empty"), Resolved::new_run(&options, &dataset, &gpu)),
         };
-        let evaluation = EvaluationOptions { every: Some(32), at_end: EvaluationAtEnd::All };
+        let evaluation = EvaluationOptions { every: Some(16), at_end: EvaluationAtEnd::All };
         let resolved = resolved.expect("it fits");
         let run = TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation, overcommit: false };
         let mut session = run.begin(listener).expect("it begins");

@@ -45,7 +45,7 @@ impl TrainingSession<'_> {
         if self.stepper.seconds() - self.tried < BETWEEN_CHECKPOINTS {
             return Ok(());
         }
-        self.try_to_save(observer)?;
+        self.try_to_save(false, observer)?;
         Ok(())
     }
 
@@ -57,11 +57,11 @@ impl TrainingSession<'_> {
     /// Saves when all steps are taken; tries again a few times unless an end was asked for, since all since the last
     /// checkpoint would be lost.
     pub(super) fn save_at_end(&mut self, observer: &mut dyn Observer) -> Result<()> {
-        for pause in PAUSES {
+        for (earlier, pause) in PAUSES.into_iter().enumerate() {
             if self.interrupt().is_raised() {
                 break;
             }
-            if self.try_to_save(observer)? {
+            if self.try_to_save(earlier > 0, observer)? {
                 return Ok(());
             }
             self.interrupt().sleep(pause);
@@ -95,9 +95,10 @@ impl TrainingSession<'_> {
         Ok(())
     }
 
-    /// Saves; whether that worked. That files could not be written is said.
-    fn try_to_save(&mut self, observer: &mut dyn Observer) -> Result<bool> {
+    /// Saves; whether that worked. That files could not be written is said, unless it was.
+    fn try_to_save(&mut self, is_said: bool, observer: &mut dyn Observer) -> Result<bool> {
         match self.save(observer) {
+            Err(error) if is_of_files(&error) && is_said => Ok(false),
             Err(error) if is_of_files(&error) => {
                 let reason = &format!("{error:#}");
                 observer.notice(&Event::Warning(Warning::NotSaved { reason }));
