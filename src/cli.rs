@@ -20,7 +20,8 @@ Exit codes:
   0    Done
   1    Failed for good: bad data, or it does not fit
   2    Usage
-  3    Failed, and may work when it is tried again: disk full or failing, device lost or out of memory, too many open files
+  3    Failed, and may work when it is tried again: disk full or failing, device lost, busy or out of memory, too many open
+       files, folder in use by another process
   129  Interrupted by SIGHUP, 130 by SIGINT (Ctrl-C), 143 by SIGTERM; a training is saved first, unless a second signal comes";
 
 /// Train neural radiance fields from posed photos and render new views of them.

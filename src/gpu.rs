@@ -61,7 +61,9 @@ impl Gpu {
     /// # Errors
     /// When the driver refuses to create the device.
     pub fn open(adapter: &wgpu::Adapter) -> Result<Self> {
-        Self::open_with(adapter, WANTED_FEATURES, adapter.limits())
+        let opened = Self::open_with(adapter, WANTED_FEATURES, adapter.limits());
+        // It has what is asked for: it is busy, or its memory is full.
+        opened.map_err(|failure| Transient::new(format!("{failure:#}")).into())
     }
 
     /// Opens `adapter` with these limits and those of `features` that it has.

@@ -114,8 +114,10 @@ impl Kernel {
     /// Links `source`, compares the structs that it names with `layouts` and creates the pipeline.
     ///
     /// # Errors
-    /// When the WGSL does not link, a struct differs from Rust's, or the driver refuses the pipeline.
+    /// When the WGSL does not link, a struct differs from Rust's, the driver refuses the pipeline, or the device's interrupt
+    /// was raised.
     pub fn new(gpu: &Gpu, source: &Source, layouts: &[StructLayout]) -> Result<Self> {
+        gpu.interrupt.check()?;
         let Linked { label, module, bindings, group_size } = source.link()?;
         for layout in layouts {
             compare_layout(&label, &module, layout)?;
