@@ -11,6 +11,7 @@ use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::capture::dataset::HoldOut;
 use nerf::config::Background;
 use nerf::photo::Split;
+use nerf::run::SavingOptions;
 use one_of::OneOf;
 use std::path::PathBuf;
 
@@ -113,6 +114,15 @@ pub(crate) struct Train {
     /// Measure a few test views every N steps
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) eval_every: Option<u32>,
+    /// Seconds of training between checkpoints
+    #[arg(long, value_name = "SECONDS", default_value_t = SavingOptions::default().every, value_parser = seconds)]
+    pub(crate) checkpoint_every: f64,
+    /// Most checkpoints that stay in RUN, the newest among them
+    ///
+    /// Those before it are called checkpoint-STEP.safetensors. Where the newest is damaged, every command takes the one
+    /// before, and says so.
+    #[arg(long, value_name = "N", default_value_t = SavingOptions::default().keep as u32, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) keep: u32,
     /// What lies behind transparent photos: black, white, random or r,g,b in 0..1
     #[arg(long, value_name = "COLOR", value_parser = training_background)]
     pub(crate) background: Option<Background>,

@@ -78,9 +78,10 @@ impl Session<'_> {
     /// Reads the checkpoint that `run` stands for.
     fn load_field(&self, run: &Path) -> Result<TrainedField> {
         let field = TrainedField::load(run)?;
+        field.warning().iter().for_each(|warning| self.console.warn(warning));
         let Metadata { step, seconds, adapter, dataset, .. } = field.metadata();
         let steps = count(*step as usize, "step");
-        let path = field.path.display();
+        let path = field.path().display();
         self.console.detail(&format!("{path}: {steps} in {seconds:.1} s on {adapter}, trained on {dataset}"));
         Ok(field)
     }

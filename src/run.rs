@@ -36,7 +36,7 @@ pub use evaluate::{Compared, Evaluator};
 pub use event::{DepthTold, Event, Observer, StepsTaken, Warning};
 pub use folder::RunFolder;
 pub use log_writer::LogWriter;
-pub use options::{EvaluationAtEnd, EvaluationOptions, TrainOptions};
+pub use options::{EvaluationAtEnd, EvaluationOptions, SavingOptions, TrainOptions};
 pub use resolve::Resolved;
 pub use scores::{Means, Score, Scores};
 pub use session::{NoTestViews, TrainingEnd, TrainingRun, TrainingSession};

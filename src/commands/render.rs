@@ -88,7 +88,7 @@ fn earlier(args: &Render) -> Earlier {
 fn rendering(args: &Render, field: &TrainedField, path: &[Job], depth_range: [f64; 2]) -> Map<String, Value> {
     let mut listing = Map::new();
     let mut set = |key: &str, value: Value| listing.insert(key.to_owned(), value);
-    set("checkpoint", json!(field.path.display().to_string()));
+    set("checkpoint", json!(field.path().display().to_string()));
     set("step", json!(field.metadata().step));
     if args.depth {
         set("depth_near", json!(depth_range[0]));

@@ -7,6 +7,7 @@ use crate::score_summary;
 use anyhow::{Result, ensure};
 use nerf::camera::LensKind;
 use nerf::capture::dataset::Dataset;
+use nerf::field::checkpoint::locate;
 use nerf::run::report::test_views::TestViews;
 use nerf::run::report::{Facts, Report};
 use nerf::run::{Evaluator, RunFolder, TrainedField};
@@ -16,10 +17,9 @@ use std::path::{Path, PathBuf};
 pub(super) fn run(args: &Args, session: &Session<'_>) -> Result<()> {
     let folder = RunFolder::find(&args.run)?;
     let log = folder.log()?;
-    let file = folder.checkpoint();
-    let (facts, views) = if file.is_file() {
-        let field = session.load_field(&file)?;
-        let trained = std::fs::metadata(&file).and_then(|data| data.modified()).ok();
+    let (facts, views) = if locate(folder.path()).is_ok() {
+        let field = session.load_field(folder.path())?;
+        let trained = std::fs::metadata(field.path()).and_then(|data| data.modified()).ok();
         let views = views(args, &field, session)?;
         (Facts { trained, ..Facts::of(folder.path(), field.metadata())? }, views)
     } else {

@@ -11,18 +11,18 @@ use nerf::capture::diagnostics::Severity;
 use nerf::capture::health::Survey;
 use nerf::capture::health::depth::DepthSurvey;
 use nerf::config::schedule::Budget;
-use nerf::field::checkpoint::{Checkpoint, Metadata};
+use nerf::field::checkpoint::{Checkpoint, Metadata, Opened};
 use nerf::run::memory::peak_bytes;
 use nerf::run::report::test_views::TestViews;
 use nerf::run::{
-    EvaluationAtEnd, EvaluationOptions, NoTestViews, Resolved, RunFolder, TrainOptions, TrainingEnd,
-    TrainingRun,
+    EvaluationAtEnd, EvaluationOptions, NoTestViews, Resolved, RunFolder, SavingOptions, TrainOptions,
+    TrainingEnd, TrainingRun,
 };
 use nerf::support::format::count;
 use serde_json::json;
 
 pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
-    let (folder, checkpoint) = folder(args)?;
+    let (folder, checkpoint) = folder(args, session)?;
     let dataset = open(args, checkpoint.as_ref(), session)?;
     let gpu = session.open_gpu()?;
     let options = options(args);
@@ -41,9 +41,17 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
             _ => EvaluationAtEnd::Share,
         },
     };
+    let saving = SavingOptions { every: args.checkpoint_every, keep: args.keep as usize };
     let mut narrator = session.narrator();
-    let run =
-        TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation, overcommit: args.overcommit };
+    let run = TrainingRun {
+        gpu,
+        dataset: &dataset,
+        resolved,
+        folder,
+        evaluation,
+        saving,
+        overcommit: args.overcommit,
+    };
     let mut training = run.begin(&mut narrator)?;
     session.end_gracefully()?;
     let end = training.train(&mut narrator)?;
@@ -91,13 +99,15 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
 }
 
 /// The folder to write to, and the run in it to go on with.
-fn folder(args: &Train) -> Result<(RunFolder, Option<Checkpoint>)> {
-    if args.resume {
-        let (folder, checkpoint) = RunFolder::to_resume(&args.out)?;
-        return Ok((folder, Some(checkpoint)));
-    }
-    if args.resume_or_start {
-        return RunFolder::to_resume_or_start(&args.out);
+fn folder(args: &Train, session: &Session<'_>) -> Result<(RunFolder, Option<Checkpoint>)> {
+    if args.resume || args.resume_or_start {
+        let (folder, opened) = match args.resume {
+            true => RunFolder::to_resume(&args.out).map(|(folder, opened)| (folder, Some(opened)))?,
+            false => RunFolder::to_resume_or_start(&args.out)?,
+        };
+        let warning = opened.as_ref().and_then(Opened::warning);
+        warning.iter().for_each(|warning| session.console.warn(warning));
+        return Ok((folder, opened.map(|opened| opened.checkpoint)));
     }
     let folder = if args.overwrite { RunFolder::to_overwrite } else { RunFolder::unused };
     Ok((folder(&args.out)?, None))

@@ -4,22 +4,23 @@
 //! `table_moments`: `[entries, 4]`, `mlp*`: `[quads, 4]`), `occupancy` (`[cascades, cells, cells, cells]`),
 //! `occupancy_bits`, and [`CHECKSUMS`] of all that is before them. The metadata entry [`KEY`] holds [`Metadata`] as JSON.
 
+mod earlier;
 mod file;
 mod metadata;
 
+pub use earlier::{Opened, locate, remove_earlier, replace};
 pub use file::CHECKSUMS;
 pub use metadata::{Metadata, SplitNames};
 
 use crate::field::parameters::Array;
 use crate::field::state::State;
 use crate::support::file::write_atomically;
-use crate::support::remedy::{Advised, Remedy};
 use anyhow::{Context, Result, bail, ensure};
 use file::Reader;
 use std::fmt;
 use std::fs::File;
 use std::io::{Read, Seek};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The layout of the file that this version writes. Those before had no checksums.
 pub const FORMAT: u64 = 4;
@@ -107,22 +108,18 @@ impl Checkpoint {
         let Metadata { step, rays, step_excess, .. } = metadata;
         Ok(Self { metadata, state: State { step, rays, step_excess, arrays } })
     }
-}
 
-/// The checkpoint that a folder of a training run, or a path to the file itself, stands for.
-///
-/// # Errors
-/// When there is none; the message says where it was looked for.
-pub fn locate(path: &Path) -> Result<PathBuf> {
-    if path.is_dir() {
-        let file = path.join(FILE);
-        let missing = || format!("the folder {} has no {FILE}; expected ", path.display());
-        ensure!(file.is_file(), Advised::new(missing(), Remedy::RunFolder, ""));
-        return Ok(file);
+    /// What a file says of itself, if all of it is as it was written, as far as it has checksums. Little of it is in memory
+    /// at a time.
+    ///
+    /// # Errors
+    /// As [`Checkpoint::load`].
+    pub fn check(path: &Path) -> Result<Metadata> {
+        let mut reader = Reader::new(File::open(path)?)?;
+        let metadata = Metadata::parse(reader.description()?, reader.has_checksums())?;
+        reader.check()?;
+        Ok(metadata)
     }
-    let missing = || format!("{} does not exist; expected ", path.display());
-    ensure!(path.is_file(), Advised::new(missing(), Remedy::RunFolder, ", or a checkpoint in it"));
-    Ok(path.to_owned())
 }
 
 fn check_finite(name: &str, values: &[f32]) -> Result<()> {

@@ -3,7 +3,7 @@
 use super::log::Log;
 use super::log_writer::LogWriter;
 use crate::config::Config;
-use crate::field::checkpoint::{self, Checkpoint};
+use crate::field::checkpoint::{self, Opened};
 use crate::support::file::{behind_links, write_json};
 use crate::support::lock::{FolderLock, is_used};
 use crate::support::remedy::{Advised, Remedy};
@@ -79,33 +79,34 @@ impl RunFolder {
         Self::locked(path)
     }
 
-    /// The folder of a run to go on with, and its checkpoint.
+    /// The folder of a run to go on with, and its newest checkpoint that can be used.
     ///
     /// # Errors
     /// When there is no checkpoint, it cannot be used, or another process trains into the folder.
-    pub fn to_resume(path: &Path) -> Result<(Self, Checkpoint)> {
+    pub fn to_resume(path: &Path) -> Result<(Self, Opened)> {
         let locate = || checkpoint::locate(path).context("there is nothing to resume");
         if !path.exists() {
             locate()?;
         }
         // Before the checkpoint is read, which another process might replace.
         let folder = Self::locked(path)?;
-        let file = locate()?;
-        Ok((folder, Checkpoint::load(&file)?))
+        locate()?;
+        Ok((folder, Opened::of(path)?))
     }
 
-    /// The folder of a run to go on with, and its checkpoint. Without one it is a folder for a new run, which replaces what an
+    /// The folder of a run to go on with, and its newest checkpoint that can be used. Without any it is a folder for a new run, which replaces what an
     /// earlier one left that ended before it saved.
     ///
     /// # Errors
     /// When it is no folder, cannot be written to, its checkpoint cannot be used, or another process trains into it.
-    pub fn to_resume_or_start(path: &Path) -> Result<(Self, Option<Checkpoint>)> {
+    pub fn to_resume_or_start(path: &Path) -> Result<(Self, Option<Opened>)> {
         let folder = Self::to_overwrite(path)?;
-        let file = folder.checkpoint();
+        let newest = fs::metadata(folder.checkpoint());
         // Where anything else is the matter, it must not be replaced.
-        let is_missing = fs::metadata(&file).is_err_and(|error| error.kind() == ErrorKind::NotFound);
-        let checkpoint = if is_missing { None } else { Some(Checkpoint::load(&file)?) };
-        Ok((folder, checkpoint))
+        let is_missing = newest.is_err_and(|error| error.kind() == ErrorKind::NotFound)
+            && checkpoint::locate(path).is_err();
+        let opened = if is_missing { None } else { Some(Opened::of(path)?) };
+        Ok((folder, opened))
     }
 
     /// Whether nothing keeps other processes from writing to it, since its file system has no locks.
@@ -176,6 +177,7 @@ impl RunFolder {
     /// When a file cannot be written or removed.
     pub fn begin(&self, config: &Config, resumed: Option<u32>) -> Result<LogWriter> {
         if resumed.is_none() {
+            checkpoint::remove_earlier(&self.checkpoint()).context("removing an earlier checkpoint")?;
             for name in [Self::CHECKPOINT, Self::LOG, Self::CONFIG, Self::REPORT] {
                 // A link stays, to be written through.
                 remove(&behind_links(&self.path.join(name))?)?;

@@ -30,6 +30,22 @@ pub struct TrainOptions {
     pub budget: Budget,
 }
 
+/// When a run saves itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SavingOptions {
+    /// Seconds of training between checkpoints.
+    pub every: f64,
+    /// Most checkpoints that stay, the newest among them.
+    pub keep: usize,
+}
+
+impl Default for SavingOptions {
+    /// Every minute, and the one before stays.
+    fn default() -> Self {
+        Self { every: 60.0, keep: 2 }
+    }
+}
+
 /// When test views are measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EvaluationOptions {

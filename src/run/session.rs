@@ -12,7 +12,7 @@ use super::folder::RunFolder;
 use super::log::{self, LogRow};
 use super::log_writer::LogWriter;
 use super::memory::MemoryUse;
-use super::options::EvaluationOptions;
+use super::options::{EvaluationOptions, SavingOptions};
 use super::resolve::Resolved;
 use super::stepper::{Block, Stepper};
 use crate::capture::dataset::Dataset;
@@ -47,6 +47,8 @@ pub struct TrainingRun<'a> {
     pub evaluation: EvaluationOptions,
     /// Whether it begins although the host's memory seems not to suffice.
     pub overcommit: bool,
+    /// When it is saved.
+    pub saving: SavingOptions,
 }
 
 /// A training run under way.
@@ -56,6 +58,7 @@ pub struct TrainingSession<'a> {
     test: Vec<usize>,
     folder: RunFolder,
     evaluation: EvaluationOptions,
+    saving: SavingOptions,
     stepper: Stepper,
     log: LogWriter,
     /// `None` where nothing is measured.
@@ -96,7 +99,7 @@ impl<'a> TrainingRun<'a> {
     /// When the memory does not suffice, a photo cannot be read, the adapter refuses a kernel, its interrupt was raised, or
     /// the folder cannot be written to.
     pub fn begin(self, observer: &mut dyn Observer) -> Result<TrainingSession<'a>> {
-        let Self { gpu, dataset, mut resolved, mut folder, evaluation, overcommit } = self;
+        let Self { gpu, dataset, mut resolved, mut folder, evaluation, saving, overcommit } = self;
         let Resolved { metadata, plan, test, .. } = &resolved;
         observer.notice(&Event::Resolved { metadata, plan, gpu: &gpu, test_views: test.len() });
         let tested = if evaluation.few(FEW_VIEWS).is_some() { &resolved.test[..] } else { &[] };
@@ -140,6 +143,7 @@ impl<'a> TrainingRun<'a> {
             test,
             folder,
             evaluation,
+            saving,
             stepper,
             log,
             evaluator,

@@ -2,7 +2,7 @@
 
 use crate::camera::LensKind;
 use crate::field::Field;
-use crate::field::checkpoint::{self, Checkpoint, Metadata};
+use crate::field::checkpoint::{Checkpoint, Metadata, Opened};
 use crate::field::parameters::Numbers;
 use crate::field::renderer::Renderer;
 use crate::gpu::Gpu;
@@ -10,37 +10,47 @@ use crate::photo::color_space::ColorSpace;
 use anyhow::Result;
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// A checkpoint that was read.
 #[derive(Debug)]
 pub struct TrainedField {
-    /// The file.
-    pub path: PathBuf,
-    checkpoint: Checkpoint,
+    opened: Opened,
 }
 
 impl TrainedField {
-    /// Reads the checkpoint that `run`, a folder or the file itself, stands for.
+    /// Reads the checkpoint that `run`, a folder or the file itself, stands for: in a folder the newest that can be used.
     ///
     /// # Errors
-    /// When there is none, or it cannot be used.
+    /// When there is none, or none can be used.
     pub fn load(run: &Path) -> Result<Self> {
-        let path = checkpoint::locate(run)?;
-        Ok(Self { checkpoint: Checkpoint::load(&path)?, path })
+        Ok(Self { opened: Opened::of(run)? })
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.opened.path
+    }
+
+    /// That an earlier checkpoint was read, and why; `None` where the newest was.
+    #[must_use]
+    pub fn warning(&self) -> Option<String> {
+        self.opened.warning()
     }
 
     /// What the checkpoint says about itself.
     #[must_use]
     pub fn metadata(&self) -> &Metadata {
-        &self.checkpoint.metadata
+        &self.opened.checkpoint.metadata
     }
 
     /// A text that tells fields apart by what they render, however their files are called.
     #[must_use]
     pub fn identity(&self) -> String {
-        let Checkpoint { metadata: Metadata { config, bounds, features, .. }, state } = &self.checkpoint;
+        let Checkpoint { metadata: Metadata { config, bounds, features, .. }, state } =
+            &self.opened.checkpoint;
         let mut hasher = DefaultHasher::new();
         format!("{config:?} {bounds:?} {features:?}").hash(&mut hasher);
         for (name, numbers) in &state.arrays {
@@ -64,6 +74,6 @@ impl TrainedField {
     /// # Errors
     /// When the adapter cannot hold the field, or refuses a kernel.
     pub fn renderer(&self, gpu: &Arc<Gpu>, lenses: &BTreeSet<LensKind>) -> Result<Renderer> {
-        Renderer::new(&Field::of(gpu, &self.checkpoint)?, lenses)
+        Renderer::new(&Field::of(gpu, &self.opened.checkpoint)?, lenses)
     }
 }

@@ -357,12 +357,14 @@ fn a_run_without_a_terminal_tells_what_happens_and_stops_when_asked() {
         let budget = Budget { steps: Some(end), seconds: None };
         let options = TrainOptions { config: Some(PathBuf::from(SMOKE)), budget, ..TrainOptions::default() };
         let (folder, resolved) = match RunFolder::to_resume(&path) {
-            Ok((folder, checkpoint)) => (folder, Resolved::resume(&options, &dataset, &gpu, checkpoint)),
+            Ok((folder, opened)) => (folder, Resolved::resume(&options, &dataset, &gpu, opened.checkpoint)),
             Err(_) => (RunFolder::unused(&path).expect("empty"), Resolved::new_run(&options, &dataset, &gpu)),
         };
         let evaluation = EvaluationOptions { every: Some(16), at_end: EvaluationAtEnd::All };
         let resolved = resolved.expect("it fits");
-        let run = TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation, overcommit: false };
+        let saving = Default::default();
+        let run =
+            TrainingRun { gpu, dataset: &dataset, resolved, folder, evaluation, saving, overcommit: false };
         let mut session = run.begin(listener).expect("it begins");
         let end = session.train(listener).expect("it trains");
         let views = session.evaluate(&end, listener).expect("measured");

@@ -17,6 +17,8 @@ const LONGEST_HEADER: u64 = 100_000_000;
 const LENGTH_BYTES: u64 = 8;
 /// Bytes that are read to see whether it is a checkpoint at all.
 const FIRST_LOOK: u64 = 64;
+/// Bytes of a tensor that are in memory while it is checked.
+const READ_AT_ONCE: usize = 1 << 20;
 const NOT_OURS: &str = "expected a safetensors file written by `nerf train`, found something else";
 /// How the header of every checkpoint begins, so that a damaged one is known as such.
 const BEGINNING: &[u8] = b"{\"__metadata__\":{\"nerf\":\"{";
@@ -171,15 +173,39 @@ impl<R: Read + Seek> Reader<R> {
         };
         let read = self.source.read_exact(bytes);
         read.with_context(|| format!("the tensor '{name}' cannot be read"))?;
-        if let Some(checksums) = &self.checksums {
-            let place = self.header.offset_keys().iter().position(|key| key == name);
-            let expected = place.and_then(|place| checksums.get(place));
-            ensure!(
-                expected == Some(&crc32fast::hash(bytes)),
-                "the tensor '{name}' is damaged: it does not have the checksum that it was written with"
-            );
-        }
+        let found = crc32fast::hash(bytes);
+        self.compare(name, found)?;
         Ok(numbers)
+    }
+
+    /// Compares all tensors with their checksums, where there are some.
+    ///
+    /// # Errors
+    /// Names the first that is damaged.
+    pub(super) fn check(&mut self) -> Result<()> {
+        let mut part = vec![0; READ_AT_ONCE];
+        for name in self.header.offset_keys().iter().filter(|name| *name != CHECKSUMS) {
+            let (begin, end) = self.header.info(name).map_or((0, 0), |info| info.data_offsets);
+            self.source.seek(SeekFrom::Start(self.data + begin as u64))?;
+            let mut checksum = crc32fast::Hasher::new();
+            for at in (begin..end).step_by(READ_AT_ONCE) {
+                let part = &mut part[..READ_AT_ONCE.min(end - at)];
+                self.source.read_exact(part)?;
+                checksum.update(part);
+            }
+            self.compare(name, checksum.finalize())?;
+        }
+        Ok(())
+    }
+
+    fn compare(&self, name: &str, found: u32) -> Result<()> {
+        let Some(checksums) = &self.checksums else { return Ok(()) };
+        let place = self.header.offset_keys().iter().position(|key| key == name);
+        ensure!(
+            place.and_then(|place| checksums.get(place)) == Some(&found),
+            "the tensor '{name}' is damaged: it does not have the checksum that it was written with"
+        );
+        Ok(())
     }
 }
 

@@ -11,8 +11,9 @@ use safetensors::SafeTensors;
 use safetensors::tensor::TensorView;
 use serde_json::{Value, json};
 use std::io::Cursor;
+use std::path::PathBuf;
 
-fn checkpoint() -> Checkpoint {
+pub(super) fn checkpoint() -> Checkpoint {
     let mut config = Config::default();
     let small = r#"{"grid": {"levels": 8, "finest": 40, "log2_table": 8}, "occupancy": {"cells": 16}}"#;
     config.merge(&serde_json::from_str(small).expect("JSON")).expect("valid");

@@ -1,7 +1,7 @@
 //! What a session writes while it trains: checkpoints and the log. A file that cannot be written does not end the training.
 
 use super::TrainingSession;
-use crate::field::checkpoint::Metadata;
+use crate::field::checkpoint::{self, Checkpoint, Metadata};
 use crate::run::event::{Event, Observer, Warning};
 use crate::run::log::LogRow;
 use crate::support::lock::InUse;
@@ -9,8 +9,6 @@ use anyhow::{Context, Error, Result};
 use std::io;
 use std::time::Duration;
 
-/// Seconds of training between checkpoints.
-const BETWEEN_CHECKPOINTS: f64 = 60.0;
 /// Pauses between attempts to save at the end, when the next interval does not come.
 const PAUSES: [Duration; 3] = [Duration::from_secs(1), Duration::from_secs(2), Duration::from_secs(4)];
 
@@ -42,7 +40,7 @@ impl TrainingSession<'_> {
 
     /// Saves when it is time to.
     pub(super) fn save_if_due(&mut self, observer: &mut dyn Observer) -> Result<()> {
-        if self.stepper.seconds() - self.tried < BETWEEN_CHECKPOINTS {
+        if self.stepper.seconds() - self.tried < self.saving.every {
             return Ok(());
         }
         self.try_to_save(false, observer)?;
@@ -54,9 +52,13 @@ impl TrainingSession<'_> {
         if self.saved.0 < self.stepper.steps() { self.save(observer) } else { Ok(()) }
     }
 
-    /// Saves when all steps are taken; tries again a few times unless an end was asked for, since all since the last
-    /// checkpoint would be lost.
+    /// Saves when all steps are taken, unless it is; tries again a few times unless an end was asked for, since all since the
+    /// last checkpoint would be lost.
     pub(super) fn save_at_end(&mut self, observer: &mut dyn Observer) -> Result<()> {
+        let newest = Checkpoint::check(&self.folder.checkpoint());
+        if newest.is_ok_and(|newest| newest.step == self.stepper.steps()) {
+            return Ok(());
+        }
         for (earlier, pause) in PAUSES.into_iter().enumerate() {
             if self.interrupt().is_raised() {
                 break;
@@ -76,7 +78,10 @@ impl TrainingSession<'_> {
             session.make_folder_again(observer)?;
             let seconds = session.stepper.clock().recorded_seconds();
             let metadata = Metadata { seconds, ..session.metadata.clone() };
-            session.stepper.trainer().save(&session.folder.checkpoint(), metadata)
+            let path = session.folder.checkpoint();
+            checkpoint::replace(&path, step, session.saving.keep, || {
+                session.stepper.trainer().save(&path, metadata)
+            })
         };
         let saved = attempt(self, observer);
         saved.with_context(|| format!("at step {step} ({})", self.kept()))?;
