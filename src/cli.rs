@@ -126,9 +126,9 @@ pub(crate) struct Train {
     /// What lies behind transparent photos: black, white, random or r,g,b in 0..1
     #[arg(long, value_name = "COLOR", value_parser = training_background)]
     pub(crate) background: Option<Background>,
-    /// Without a test split, keep every N-th frame for testing, or none
-    #[arg(long, value_name = "N|none", default_value = "8", value_parser = hold_out)]
-    pub(crate) hold_out: HoldOut,
+    /// Without a test split, keep every N-th frame for testing, or none [default: 8]
+    #[arg(long, value_name = "N|none", value_parser = hold_out)]
+    pub(crate) hold_out: Option<HoldOut>,
     /// Continue the run in RUN
     #[arg(long, conflicts_with = "overwrite")]
     pub(crate) resume: bool,

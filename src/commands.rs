@@ -19,7 +19,7 @@ use anyhow::{Context, Result};
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::field::checkpoint::Metadata;
 use nerf::gpu::{Gpu, adapter};
-use nerf::run::TrainedField;
+use nerf::run::{Differences, TrainedField};
 use nerf::support::format::count;
 use serde_json::Value;
 use std::io::Write;
@@ -113,6 +113,21 @@ impl Session<'_> {
         };
         printed.and_then(|()| out.flush()).context("the result could not be printed")
     }
+}
+
+/// Warns where frames of a dataset are not what the run had under their names.
+fn warn_of_differences(
+    metadata: &Metadata,
+    (dataset, frames): (&Dataset, &[usize]),
+    session: &Session<'_>,
+) -> Result<()> {
+    if let Some(what) = Differences::between(metadata, dataset, frames)?.describe() {
+        session.console.warn(&format!(
+            "{what} are not those of the run, which began with {}: this is another dataset, or it was changed",
+            metadata.dataset
+        ));
+    }
+    Ok(())
 }
 
 /// Opens a dataset to compare a field with: the photos are read as the command line says, else as for training.

@@ -52,6 +52,9 @@ fn advice(remedy: &Remedy) -> String {
                  anew with --overwrite"
             )
         }
+        Remedy::SameDataset { dataset } => format!(
+            "--resume with the dataset that it began with, {dataset}, as it was then, or start anew with --overwrite"
+        ),
         Remedy::UsedFolder => {
             "name another one, or add --resume to go on with the run in it, or --overwrite to replace it"
                 .to_owned()

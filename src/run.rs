@@ -8,6 +8,7 @@
 //! with photos, and a [`TrainedField`] is a checkpoint to be rendered.
 
 mod clock;
+mod contents;
 pub mod depths;
 mod disk;
 mod estimate;
@@ -31,6 +32,7 @@ mod trained;
 mod training_photos;
 
 pub use clock::StepClock;
+pub use contents::Differences;
 pub use estimate::Estimate;
 pub use evaluate::{Compared, Evaluator};
 pub use event::{DepthTold, Event, Observer, StepsTaken, Warning};

@@ -4,6 +4,7 @@
 #[cfg(feature = "run")]
 pub mod chart;
 pub mod file;
+pub mod fingerprint;
 pub mod format;
 pub mod interrupt;
 pub mod lock;

@@ -2,7 +2,7 @@
 
 mod pictures;
 
-use super::{Session, open_to_compare};
+use super::{Session, open_to_compare, warn_of_differences};
 use crate::cli::Eval;
 use crate::score_summary::describe_near;
 use anyhow::{Context, Result, ensure};
@@ -20,6 +20,7 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     let field = session.load_field(&args.run)?;
     let dataset = open_to_compare(&args.dataset, &args.reading, field.metadata())?;
     let indices = frames(&field, &dataset, args.split, session)?;
+    warn_of_differences(field.metadata(), (&dataset, &indices), session)?;
     ensure!(
         dataset.is_hdr == field.metadata().features.hdr,
         "the field was trained on {} images, and {} has {} images; name the dataset it was trained on",

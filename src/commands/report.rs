@@ -1,6 +1,6 @@
 //! `nerf report`: the page about a training run, written by `nerf train` too.
 
-use super::{Session, open_to_compare};
+use super::{Session, open_to_compare, warn_of_differences};
 use crate::cli::Report as Args;
 use crate::flags::with_flags;
 use crate::score_summary;
@@ -74,6 +74,7 @@ fn views(args: &Args, field: &TrainedField, session: &Session<'_>) -> Result<Res
         }
         Err(error) => return Err(error),
     };
+    warn_of_differences(field.metadata(), (&dataset, &indices), session)?;
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
     let mut evaluator = Evaluator::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);

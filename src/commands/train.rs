@@ -1,5 +1,7 @@
 //! `nerf train`: a dataset becomes a checkpoint.
 
+mod ignored;
+
 use super::Session;
 use crate::cli::Train;
 use crate::flags::{message_with_flags, with_flags};
@@ -28,7 +30,12 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let options = options(args);
     let resolved = match checkpoint {
         None => Resolved::new_run(&options, &dataset, &gpu)?,
-        Some(checkpoint) => Resolved::resume(&options, &dataset, &gpu, checkpoint)?,
+        Some(checkpoint) => {
+            let earlier = checkpoint.metadata.clone();
+            let resolved = Resolved::resume(&options, &dataset, &gpu, checkpoint)?;
+            ignored::say(args, (&earlier, &resolved.metadata), &dataset, &folder, session);
+            resolved
+        }
     };
     if resolved.metadata.config.loss.depth > 0.0 {
         warn_of_depth(&dataset, &resolved.train, session);
@@ -68,6 +75,7 @@ pub(super) fn run(args: &Train, session: &Session<'_>) -> Result<()> {
     let mut result = json!({
         "run": folder,
         "steps": end.step,
+        "steps_taken": end.step - training.metadata().step,
         "seconds": end.seconds,
         "loss": end.loss.map(|[_, last]| last),
         "skipped": end.skipped,
@@ -117,7 +125,8 @@ fn folder(args: &Train, session: &Session<'_>) -> Result<(RunFolder, Option<Chec
 fn open(args: &Train, checkpoint: Option<&Checkpoint>, session: &Session<'_>) -> Result<Dataset> {
     let earlier = checkpoint.map(|checkpoint| checkpoint.metadata.reading.clone());
     let reading = args.reading.over(earlier.unwrap_or_default());
-    let options = OpenOptions { hold_out: args.hold_out, reading, ..OpenOptions::default() };
+    let options =
+        OpenOptions { hold_out: args.hold_out.unwrap_or_default(), reading, ..OpenOptions::default() };
     let dataset = Dataset::open(&args.dataset, &options)?;
     session.console.notes(&dataset);
     let findings = Survey::of(&dataset).findings;
@@ -154,6 +163,12 @@ fn options(args: &Train) -> TrainOptions {
 /// How the run went, in one line; `metadata` describes its beginning.
 fn end_line(end: &TrainingEnd, metadata: &Metadata, folder: &str) -> String {
     let steps = count(end.step as usize, "step");
+    if end.step == metadata.step && !end.interrupted {
+        return format!(
+            "no step was taken: the run in {folder} has had its {steps} in {}; give it more with --steps or --seconds",
+            duration(end.seconds)
+        );
+    }
     let mut text = format!("{steps} in {}, saved to {folder}", duration(end.seconds));
     match end.skipped {
         0 => {}

@@ -10,7 +10,7 @@ mod metadata;
 
 pub use earlier::{Opened, locate, remove_earlier, replace};
 pub use file::CHECKSUMS;
-pub use metadata::{Metadata, SplitNames};
+pub use metadata::{FrameContents, Metadata, SplitNames};
 
 use crate::field::parameters::Array;
 use crate::field::state::State;

@@ -1,5 +1,6 @@
 //! What is trained, on what, and for how long: options, a dataset, an adapter and an earlier run together.
 
+use super::contents::Differences;
 use super::evaluate::Evaluator;
 use super::event::{Event, Observer, Warning};
 use super::memory::MemoryUse;
@@ -10,7 +11,7 @@ use crate::camera::orbit::Orbit;
 use crate::capture::dataset::{Dataset, evenly_spaced};
 use crate::config::Config;
 use crate::config::schedule::Budget;
-use crate::field::checkpoint::{Checkpoint, FORMAT, Metadata, SplitNames};
+use crate::field::checkpoint::{Checkpoint, FORMAT, FrameContents, Metadata, SplitNames};
 use crate::field::layout::{Layout, finest_resolution};
 use crate::field::renderer::Renderer;
 use crate::field::state::State;
@@ -151,8 +152,7 @@ fn ended(metadata: Metadata, options: &TrainOptions, gpu: &Gpu, earlier: Option<
         let why = ": how many steps fit into a time differs from run to run";
         bail!(Advised::new("a deterministic run needs ", Remedy::StepsAlone, why));
     }
-    let metadata =
-        Metadata { dataset: options.dataset.clone(), adapter: gpu.info.name.clone(), budget, ..metadata };
+    let metadata = Metadata { adapter: gpu.info.name.clone(), budget, ..metadata };
     // What is not sound now would be found when its first checkpoint is read.
     metadata.validate()?;
     Ok(metadata)
@@ -164,9 +164,11 @@ fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<Metadat
     let config = options.configure(Config::for_dataset(dataset, gpu.is_cpu())?)?.with_finest(dataset);
     let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
     let orbit = Orbit::of(&dataset.cameras(&dataset.train), bounds.center);
+    let splits =
+        SplitNames { train: names(&dataset.train), val: names(&dataset.val), test: names(&dataset.test) };
     Ok(Metadata {
         format: FORMAT,
-        dataset: String::new(),
+        dataset: options.dataset.clone(),
         adapter: String::new(),
         step: 0,
         rays: config.batch.first_rays,
@@ -175,11 +177,8 @@ fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<Metadat
         budget: Budget::default(),
         features: SceneFeatures::of(dataset, &config)?,
         reading: dataset.reading.clone(),
-        splits: SplitNames {
-            train: names(&dataset.train),
-            val: names(&dataset.val),
-            test: names(&dataset.test),
-        },
+        contents: FrameContents::of(dataset, &splits)?,
+        splits,
         image_size: [orbit.width, orbit.height],
         has_alpha: dataset.is_cutout,
         orbit,
@@ -198,7 +197,12 @@ fn again(options: &TrainOptions, metadata: Metadata, dataset: &Dataset, train: &
         bail!(Advised::new(found, Remedy::SameField, ""));
     }
     let features = metadata.features.clone().for_photos(dataset, train, &config)?;
-    Ok(Metadata { features, config: config.into(), ..metadata })
+    // A run from before its contents were kept has them from now on.
+    let contents = match metadata.contents {
+        None => FrameContents::of(dataset, &metadata.splits)?,
+        known => known,
+    };
+    Ok(Metadata { features, contents, config: config.into(), ..metadata })
 }
 
 /// Photos must be read as before.
@@ -230,19 +234,25 @@ fn same_frames(metadata: &Metadata, dataset: &Dataset) -> Result<(Vec<usize>, Ve
         few(&missing),
         metadata.dataset
     );
-    let orbit = Orbit::of(&dataset.cameras(&train), metadata.bounds.center);
-    let is_same = [orbit.width, orbit.height] == metadata.image_size
-        && (orbit.radius - metadata.orbit.radius).abs() <= 1e-6 * orbit.radius;
-    ensure!(
-        is_same,
-        "the frames of this dataset have other cameras than those trained on; resume with the dataset that the \
-         training began with, {}",
-        metadata.dataset
-    );
+    let test = dataset.find(&metadata.splits.test).0;
+    let used = [&train[..], &test].concat();
+    let differences = Differences::between(metadata, dataset, &used)?.describe();
+    if let Some(what) = differences.or_else(|| coarse_difference(metadata, dataset, &train)) {
+        let found = format!("{what} are not those of the run; ");
+        bail!(Advised::new(found, Remedy::SameDataset { dataset: metadata.dataset.clone() }, ""));
+    }
     ensure!(
         metadata.features.hdr == dataset.is_hdr,
         "the run began with images of another kind (display-referred or linear); resume with {}",
         metadata.dataset
     );
-    Ok((train, dataset.find(&metadata.splits.test).0))
+    Ok((train, test))
+}
+
+/// What can be told of runs from before their contents were kept.
+fn coarse_difference(metadata: &Metadata, dataset: &Dataset, train: &[usize]) -> Option<String> {
+    let orbit = Orbit::of(&dataset.cameras(train), metadata.bounds.center);
+    let is_same = [orbit.width, orbit.height] == metadata.image_size
+        && (orbit.radius - metadata.orbit.radius).abs() <= 1e-6 * orbit.radius;
+    (metadata.contents.is_none() && !is_same).then(|| "the cameras of this dataset".to_owned())
 }

@@ -49,6 +49,11 @@ pub enum Remedy {
         /// As it is now.
         now: String,
     },
+    /// The dataset that a run began with, or a new run.
+    SameDataset {
+        /// Its path, as it was given then.
+        dataset: String,
+    },
     /// Another folder, or what is in it.
     UsedFolder,
     /// The folder of a run.
@@ -86,6 +91,10 @@ impl fmt::Display for Remedy {
             Self::SameReading { setting, then, now } => write!(
                 f,
                 "the run began with {setting} {then}, and now it is {now}; leave it as it was, or start anew"
+            ),
+            Self::SameDataset { dataset } => write!(
+                f,
+                "go on with the dataset that it began with, {dataset}, as it was then, or start anew"
             ),
             Self::UsedFolder => f.write_str("name another one, go on with the run in it, or replace it"),
             Self::RunFolder => f.write_str("the folder of a training run"),

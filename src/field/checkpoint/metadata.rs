@@ -1,8 +1,8 @@
 //! What a checkpoint says about itself.
 
 use super::{FORMAT, OLDEST_FORMAT, OtherVersion};
-use crate::camera::Bounds;
 use crate::camera::orbit::Orbit;
+use crate::camera::{Bounds, Camera};
 use crate::config::Config;
 use crate::config::schedule::Budget;
 use crate::field::parameters::Array;
@@ -57,6 +57,9 @@ pub struct Metadata {
     pub reading: Reading,
     /// Which frames were trained on, and which were not.
     pub splits: SplitNames,
+    /// What those frames were; `None` in files from before it was kept.
+    #[serde(default)]
+    pub contents: Option<FrameContents>,
     /// Median width and height of the training images, in pixels.
     pub image_size: [u32; 2],
     /// Whether the training images have transparent pixels.
@@ -77,7 +80,22 @@ pub struct SplitNames {
     pub test: Vec<String>,
 }
 
+/// What frames were, by which their dataset is known whatever it is called: in the order of [`SplitNames::all`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameContents {
+    /// Cameras, at the size of the photos.
+    pub cameras: Vec<Camera>,
+    /// [Fingerprints](crate::support::fingerprint::fingerprint) of the image files.
+    pub photos: Vec<u32>,
+}
+
 impl SplitNames {
+    /// Those of all splits, one after the other.
+    pub fn all(&self) -> impl Iterator<Item = &String> {
+        self.train.iter().chain(&self.val).chain(&self.test)
+    }
+
     /// The names of one split.
     #[must_use]
     pub fn names(&self, split: Split) -> &[String] {
@@ -147,6 +165,16 @@ impl Metadata {
         within("bounds.half", bounds.half, 1.0 / FARTHEST..=FARTHEST)?;
         within("needs.grey", features.grey, SceneFeatures::GREY)?;
         ensure!(!features.lenses.is_empty(), "needs.lenses is empty");
+        if let Some(FrameContents { cameras, photos }) = &self.contents {
+            let count = self.splits.all().count();
+            let is_whole = cameras.len() == count && photos.len() == count;
+            ensure!(
+                is_whole,
+                "contents must be of {count} frames; found {} and {}",
+                cameras.len(),
+                photos.len()
+            );
+        }
         within("reading.downscale", reading.downscale, 1..=u32::MAX)?;
         within("reading.max_images", reading.max_images.unwrap_or(1), 1..=usize::MAX)?;
         for side in [self.image_size[0], self.image_size[1], orbit.width, orbit.height] {

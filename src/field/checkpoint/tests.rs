@@ -33,6 +33,10 @@ pub(super) fn checkpoint() -> Checkpoint {
         features,
         reading: Reading { downscale: 2, ..Reading::default() },
         splits: SplitNames { train: vec!["a".into()], ..SplitNames::default() },
+        contents: Some(FrameContents {
+            cameras: Orbit::of(&[], DVec3::ZERO).cameras(DVec3::ZERO, 1),
+            photos: vec![7],
+        }),
         image_size: [30, 20],
         has_alpha: true,
         orbit: Orbit::of(&[], DVec3::ZERO),
@@ -242,6 +246,7 @@ fn impossible_descriptions_are_refused() {
         ("/needs/grey", json!(1e300)),
         ("/needs/lenses", json!([])),
         ("/reading/downscale", json!(0)),
+        ("/contents/photos", json!([])),
         ("/image_size", json!([0, 20])),
         ("/orbit/width", json!(u32::MAX)),
         ("/orbit/focal_px", json!(0.0)),
@@ -252,7 +257,72 @@ fn impossible_descriptions_are_refused() {
         let bytes = saying(|text| *text.pointer_mut(place).expect(place) = value.clone());
         let complaint = complaint(&bytes);
         let key = place.rsplit('/').next().unwrap_or_default();
-        let names = [key, "steps or seconds", "side of an image", "not understood", "shape"];
+        let names = [key, "contents", "steps or seconds", "side of an image", "not understood", "shape"];
         assert!(names.iter().any(|name| complaint.contains(name)), "{place} {value}: {complaint}");
     }
+}
+
+/// Every place of JSON, as a pointer to it.
+fn places(value: &Value, at: &str, found: &mut Vec<String>) {
+    found.push(at.to_owned());
+    match value {
+        Value::Object(map) => {
+            map.iter().for_each(|(key, inner)| places(inner, &format!("{at}/{key}"), found));
+        }
+        Value::Array(list) => {
+            list.iter().enumerate().for_each(|(index, inner)| places(inner, &format!("{at}/{index}"), found));
+        }
+        _ => {}
+    }
+}
+
+/// Odd values at every place, in files with and without checksums: what is believed can be used.
+#[test]
+fn odd_descriptions_are_refused_or_can_be_used() {
+    let odd = [
+        json!(null),
+        json!(true),
+        json!(-1),
+        json!(0),
+        json!(1),
+        json!(3),
+        json!(0.5),
+        json!(u32::MAX),
+        json!(u64::MAX),
+        json!(1e300),
+        json!(-1e300),
+        json!(1e-300),
+        json!(1e-45),
+        json!(""),
+        json!("x"),
+        json!("random"),
+        json!([]),
+        json!({}),
+        json!([0.0, 0.0, 0.0]),
+        json!([1e38, -1e38, 1e38]),
+    ];
+    let sound = serde_json::to_value(checkpoint().metadata).expect("JSON");
+    let mut all = Vec::new();
+    places(&sound, "", &mut all);
+    let mut believed = 0;
+    for (place, value) in all.iter().flat_map(|place| odd.iter().map(move |value| (place, value))) {
+        for format in OLDEST_FORMAT..=FORMAT {
+            let mut changed = sound.clone();
+            changed["format"] = format.into();
+            *changed.pointer_mut(place).expect("there") = value.clone();
+            let Ok(metadata) = Metadata::parse(&changed.to_string(), format == FORMAT) else { continue };
+            believed += 1;
+            let show = format!("{value} at {place}");
+            assert!(metadata.arrays().map(|array| array.count()).sum::<usize>() < 1 << 33, "{show}");
+            for camera in metadata.orbit.cameras(metadata.bounds.center, 3) {
+                let ray = camera.ray(glam::DVec2::ZERO).expect("a pinhole");
+                assert!(ray.origin.is_finite() && ray.direction.is_finite(), "{show}");
+            }
+            let plan = metadata.plan(crate::field::Capabilities::GPU);
+            let constants = format!("{:?}", plan.constants(crate::gpu::source::Source::new("a kernel")));
+            assert!(!constants.contains("inf") && !constants.contains("NaN"), "{show}: {constants}");
+            assert!(plan.step_range()[0] > 1e-9, "{show}");
+        }
+    }
+    assert!((500..20 * all.len()).contains(&believed), "{believed} of {} places", all.len());
 }
