@@ -62,11 +62,13 @@ impl Differences {
             places.get(&frame.name).map(|&place: &usize| (frame, place))
         };
         let known: Vec<_> = frames.iter().filter_map(known).collect();
+        // Cameras in one place have no distance to their middle.
+        let radius = metadata.orbit.radius.max(0.01 * metadata.bounds.half);
         let photos: Vec<u32> = known.par_iter().map(|(frame, _)| photo(frame)).collect::<Result<_>>()?;
         for ((frame, place), photo) in known.iter().zip(photos) {
             let (then, now) = (&contents.cameras[*place], &frame.camera);
             let is_read_alike = is_read_alike(&metadata.reading, &dataset.reading);
-            if let Some(how) = difference(then, now, metadata.orbit.radius, is_read_alike) {
+            if let Some(how) = difference(then, now, radius, is_read_alike) {
                 differences.cameras.push(frame.name.clone());
                 differences.first = if differences.first.is_empty() { how } else { differences.first };
             }

@@ -23,7 +23,9 @@ fn checkpoints(run: &Path) -> Vec<String> {
 #[test]
 fn the_checkpoint_before_is_kept_and_used_where_the_newest_is_damaged() {
     let run = place("kept");
-    train(&TOYS, &run, &["--no-eval", "--steps", "48", "--checkpoint-every", "0"]);
+    for (steps, further) in [("32", ["--keep", "2"].as_slice()), ("48", &["--resume"])] {
+        train(&TOYS, &run, &[&["--no-eval", "--steps", steps], further].concat());
+    }
     let newest = run.join("checkpoint.safetensors");
     assert_eq!(checkpoints(&run), ["checkpoint-32.safetensors", "checkpoint.safetensors"]);
     let mut bytes = fs::read(&newest).expect("a checkpoint");
@@ -44,13 +46,20 @@ fn the_checkpoint_before_is_kept_and_used_where_the_newest_is_damaged() {
     quietly(&["eval", text(&newest), text(&TOYS)]).assert().code(1).stderr(contains("is damaged"));
     let args = ["train", text(&TOYS), "--out", text(&run), "--resume", "--steps", "64", "--no-eval"];
     let mut command = nerf();
-    command.args(args).args(["--checkpoint-every", "0", "--keep", "3"]).assert().success().stderr(says());
-    let kept = ["checkpoint-32.safetensors", "checkpoint-48.safetensors", "checkpoint.safetensors"];
-    assert_eq!(checkpoints(&run), kept);
+    command.args(args).args(["--keep", "3"]).assert().success().stderr(says());
+    // What is damaged is not kept.
+    assert_eq!(checkpoints(&run), ["checkpoint-32.safetensors", "checkpoint.safetensors"]);
     assert_eq!(checkpoint(&run).state.step, 64);
     let before = fs::read(&newest).expect("a checkpoint");
-    let result = object(&[&args[..], &["--keep", "1"]].concat());
+    let result = object(&args);
     assert_eq!((result["steps"].as_u64(), fs::read(&newest).expect("there") == before), (Some(64), true));
+    let more = ["--steps", "96", "--checkpoint-every", "0", "--keep", "3"];
+    quietly(&["train", text(&TOYS), "--out", text(&run), "--resume", "--no-eval"])
+        .args(more)
+        .assert()
+        .success();
+    let kept = checkpoints(&run);
+    assert!(kept.len() == 3 && !kept.contains(&"checkpoint-32.safetensors".to_owned()), "{kept:?}");
     quietly(&["train", text(&TOYS), "--out", text(&run), "--overwrite", "--steps", "8", "--config", SMOKE])
         .assert()
         .success();
@@ -179,4 +188,20 @@ fn what_a_resumed_run_ignores_is_said() {
     resume(&["--steps", "40", "--config", text(&config)]).stderr(ignored().not());
     assert_eq!(checkpoint(&run).metadata.config.seed, 7);
     assert_eq!(checkpoint(&run).metadata.splits.test.len(), 2);
+}
+
+#[test]
+fn a_diverging_training_stops_and_keeps_the_good_checkpoint() {
+    let run = place("diverging");
+    train(&TOYS, &run, &["--no-eval", "--steps", "16"]);
+    let mut diverging = checkpoint(&run);
+    diverging.state.floats_mut("mlp").iter_mut().for_each(|weight| *weight *= 1e30);
+    let file = run.join("checkpoint.safetensors");
+    diverging.save(&file).expect("writable");
+    let before = fs::read(&file).expect("a checkpoint");
+    quietly(&["train", text(&TOYS), "--out", text(&run), "--resume", "--steps", "64"])
+        .assert()
+        .code(1)
+        .stderr(contains("not finite").and(contains("learning_rate")).and(contains("step 16 is kept")));
+    assert_eq!(fs::read(&file).expect("still there"), before);
 }

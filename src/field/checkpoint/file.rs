@@ -186,7 +186,7 @@ impl<R: Read + Seek> Reader<R> {
         let mut part = vec![0; READ_AT_ONCE];
         for name in self.header.offset_keys().iter().filter(|name| *name != CHECKSUMS) {
             let (begin, end) = self.header.info(name).map_or((0, 0), |info| info.data_offsets);
-            self.source.seek(SeekFrom::Start(self.data + begin as u64))?;
+            self.source.seek(SeekFrom::Start(self.data.saturating_add(begin as u64)))?;
             let mut checksum = crc32fast::Hasher::new();
             for at in (begin..end).step_by(READ_AT_ONCE) {
                 let part = &mut part[..READ_AT_ONCE.min(end - at)];
