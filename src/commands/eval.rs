@@ -13,6 +13,7 @@ use nerf::photo::Split;
 use nerf::photo::color_space::{ColorSpace, opaque_srgb8};
 use nerf::run::{Compared, Evaluator, Means, Score, TrainedField};
 use nerf::support::format::{count, few};
+use nerf::support::lock::FolderLock;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -28,6 +29,7 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
         args.dataset.display(),
         range(dataset.is_hdr)
     );
+    let _lock = args.save.as_deref().map(FolderLock::shared).transpose()?;
     let pictures = match &args.save {
         Some(folder) => pictures::paths(folder, &dataset, &indices)?,
         None => Vec::new(),

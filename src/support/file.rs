@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::temporary::{remove_leftovers, temporary_in};
+use super::temporary::temporary_in;
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 
@@ -105,13 +105,11 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     })
 }
 
-/// Creates the folder where there is none, and tries whether files can be written to it. What processes that have ended left
-/// half written in it is removed.
+/// Creates the folder where there is none, and tries whether files can be written to it.
 pub fn writable_folder(path: &Path) -> Result<()> {
     let show = path.display();
     std::fs::create_dir_all(path).with_context(|| format!("creating the folder {show}"))?;
     temporary_in(path).with_context(|| format!("the folder {show} cannot be written to"))?;
-    remove_leftovers(path);
     Ok(())
 }
 

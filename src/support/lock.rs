@@ -2,7 +2,7 @@
 //! holds it ends, however it ends.
 
 use super::file::writable_folder;
-use super::temporary::{is_same, is_temporary};
+use super::temporary::{is_same, is_temporary, remove_leftovers};
 use anyhow::{Context, Result};
 use fs4::{FileExt, TryLockError};
 use std::ffi::OsStr;
@@ -49,6 +49,8 @@ impl FolderLock {
         let file = LockFile::take(&folder.join(LOCK), hold);
         let file = file.with_context(|| format!("locking the folder {}", folder.display()))?;
         let file = file.ok_or_else(|| InUse::of(folder))?;
+        // Not before: a training keeps names of whole files meanwhile that nobody has locked.
+        remove_leftovers(folder);
         Ok(Self { folder: folder.to_owned(), file, is_new })
     }
 
@@ -199,7 +201,9 @@ mod tests {
         let error = FolderLock::alone(&folder).expect_err("it has an owner");
         let in_use = error.downcast_ref::<InUse>().expect("in use");
         assert_eq!(in_use.process, Some(std::process::id()));
+        fs::write(folder.join(".nerf-d4e5f6.part"), "the owner's").expect("writable");
         assert!(FolderLock::shared(&folder).is_err());
+        fs::remove_file(folder.join(".nerf-d4e5f6.part")).expect("not removed by who was refused");
         drop(lock);
         assert!(!folder.exists(), "nothing was written to it");
         assert!(!is_used(&folder).expect("nothing"));

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, ensure};
 use nerf::capture::dataset::Dataset;
-use nerf::support::file::{first_within, writable_folder};
+use nerf::support::file::first_within;
 use std::collections::HashSet;
 use std::fs::canonicalize;
 use std::path::{Component, Path, PathBuf};
@@ -10,10 +10,9 @@ use std::path::{Component, Path, PathBuf};
 /// The endings of image files. Other names may have full stops, too.
 const ENDINGS: [&str; 10] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "exr", "hdr", "tga"];
 
-/// The files to save the frames of `indices` to.
+/// The files in `folder`, which is there, to save the frames of `indices` to.
 pub(super) fn paths(folder: &Path, dataset: &Dataset, indices: &[usize]) -> Result<Vec<PathBuf>> {
     let show = folder.display();
-    writable_folder(folder)?;
     let beside = first_within(folder, dataset.input_files().cloned());
     ensure!(
         beside.is_none(),
