@@ -109,7 +109,8 @@ impl<'a> TrainingRun<'a> {
         }
         let home = folder.of_checkpoint()?;
         remove_leftovers(&home);
-        disk::check(&home, plan.state_bytes(), observer)?;
+        // Those that stay, and one that is being written.
+        disk::check(&home, plan.state_bytes(), saving.keep as u64 + 1, observer)?;
         let clock = Instant::now();
         let views = resolved.photos(dataset).load(&gpu, &resolved.plan, observer)?;
         let load_seconds = clock.elapsed().as_secs_f64();
