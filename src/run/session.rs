@@ -203,6 +203,7 @@ impl TrainingSession<'_> {
         if !stages.is_empty() {
             let steps = self.stepper.stages().steps().into();
             self.log(&LogRow::Stages(log::Stages { step: step.into(), steps, stages }), observer)?;
+            self.save_if_removed(observer)?;
         }
         observer.notice(&Event::Ended);
         let (skipped, interrupted) = (self.stepper.skipped(), !self.stepper.is_over());
