@@ -189,6 +189,10 @@ fn one_command_line_starts_resumes_and_ends() {
     assert!(run.join("job.log").exists() && !whole_files(&run).is_empty());
     // What was saved must not be replaced by a new start.
     let file = run.join("checkpoint.safetensors");
+    for checkpoint in whole_files(&run).iter().filter(|file| file.extension() == Some("safetensors".as_ref()))
+    {
+        std::fs::remove_file(checkpoint).expect("removable");
+    }
     std::fs::write(&file, "damaged").expect("writable");
     let (code, said, errors) = again().end();
     assert_eq!(code, Some(1), "{said}");
