@@ -134,6 +134,8 @@ pub enum Warning<'a> {
     UselessMasks {
         /// Number of photos with masks.
         masks: usize,
+        /// Whether masks are inverted.
+        inverted: bool,
     },
     /// The mask of a test view ignores every pixel, so it is not measured.
     NotMeasured {
@@ -195,10 +197,14 @@ impl fmt::Display for Warning<'_> {
                 names.len(),
                 few(names)
             ),
-            Self::UselessMasks { masks } => write!(
+            Self::UselessMasks { masks, inverted } => write!(
                 f,
-                "the masks of {} ignore no pixel; what is to be ignored must be black, 0 in red, green and blue",
-                count(*masks, "training photo")
+                "the masks of {} ignore no pixel; what is to be ignored must be {}",
+                count(*masks, "training photo"),
+                match inverted {
+                    true => "white, as masks are inverted",
+                    false => "black, 0 in red, green and blue",
+                }
             ),
             Self::NotMeasured { name } => write!(f, "{name} is not measured: its mask ignores every pixel"),
             Self::Unguarded { folder } => write!(

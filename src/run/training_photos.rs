@@ -76,7 +76,8 @@ impl<'a> TrainingPhotos<'a> {
         ensure!(ignored.len() < frames.len(), nothing_counts(frames.len(), dataset.reading.invert_masks));
         let masks = frames.iter().filter(|&&index| dataset.frames[index].has_mask).count();
         if masks > 0 && ignored_pixels == 0 {
-            observer.notice(&Event::Warning(Warning::UselessMasks { masks }));
+            let inverted = dataset.reading.invert_masks;
+            observer.notice(&Event::Warning(Warning::UselessMasks { masks, inverted }));
         }
         if plan.features.depth {
             ensure!(depths.known > 0.0, "loss.depth is above 0, and {NO_DEPTH_KNOWN}");

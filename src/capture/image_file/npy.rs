@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 use super::check_size;
 
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
+const UNFINISHED: &str = "the file ends before its numbers do; copy it again";
 /// Most bytes of a header.
 const MOST_HEADER: usize = 1 << 16;
 
@@ -25,7 +26,9 @@ pub(super) struct Array {
 
 /// Reads an array of two axes, or of one more with a single entry.
 pub(super) fn load(path: &Path) -> Result<Array> {
-    let mut reader = BufReader::new(File::open(path)?);
+    let file = File::open(path)?;
+    let bytes_in_file = file.metadata()?.len();
+    let mut reader = BufReader::new(file);
     let header = header(&mut reader)?;
     let text = |key: &str| {
         let rest = header.split_once(&format!("'{key}':")).map(|(_, rest)| rest.trim_start());
@@ -52,8 +55,10 @@ pub(super) fn load(path: &Path) -> Result<Array> {
         _ => bail!("expected an array of height x width, found one of ({shape}); save depth alone"),
     };
     check_size(width, height)?;
-    let mut bytes = vec![0; (width * height) as usize * number.bytes];
-    reader.read_exact(&mut bytes).context("the file ends before its numbers do; copy it again")?;
+    let length = (width * height) as usize * number.bytes;
+    ensure!(length as u64 <= bytes_in_file, UNFINISHED);
+    let mut bytes = vec![0; length];
+    reader.read_exact(&mut bytes).context(UNFINISHED)?;
     let values = bytes.chunks_exact(number.bytes).map(number.read).collect();
     let integer_bytes = number.is_integer.then_some(number.bytes);
     Ok(Array { width: width as u32, height: height as u32, values, integer_bytes })
