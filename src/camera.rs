@@ -8,6 +8,7 @@ mod bounds;
 mod branch;
 mod equirectangular;
 mod fisheye;
+mod framing;
 mod lens;
 mod open_cv;
 pub mod orbit;

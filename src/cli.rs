@@ -6,6 +6,7 @@ pub(crate) mod generate;
 pub(crate) mod info;
 mod one_of;
 pub(crate) mod photo_flags;
+mod render;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use nerf::capture::dataset::HoldOut;
@@ -13,6 +14,7 @@ use nerf::config::Background;
 use nerf::photo::Split;
 use nerf::run::SavingOptions;
 use one_of::OneOf;
+pub(crate) use render::Render;
 use std::path::PathBuf;
 
 /// What an exit code says, also to a scheduler.
@@ -155,59 +157,6 @@ pub(crate) struct Train {
     pub(crate) reading: photo_flags::PhotoFlags,
 }
 
-/// `nerf render`
-#[derive(Args, Debug)]
-pub(crate) struct Render {
-    /// The folder that `nerf train` wrote, or a checkpoint in it
-    #[arg(value_name = "RUN|CHECKPOINT")]
-    pub(crate) run: PathBuf,
-    /// Folder to write 0000.png, … and frames.json to
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
-    /// Where to look from.
-    #[command(flatten)]
-    pub(crate) path: CameraPath,
-    /// File format; may be repeated
-    #[arg(long, value_enum, default_value = "png")]
-    pub(crate) format: Vec<Format>,
-    /// Write half floats to OpenEXR; depth stays float
-    #[arg(long)]
-    pub(crate) half: bool,
-    /// Also write depth as a grey PNG, white near and black far
-    #[arg(long)]
-    pub(crate) depth: bool,
-    /// Width in pixels; alone, the height follows [default: the file's, else the run's]
-    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
-    pub(crate) width: Option<u32>,
-    /// Height in pixels; alone, the width follows
-    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
-    pub(crate) height: Option<u32>,
-    /// Only frames A to B - 1, counted from 0
-    #[arg(long, value_name = "A..B", value_parser = frames)]
-    pub(crate) frames: Option<(usize, usize)>,
-    /// Replace the frames in DIR; those of the same rendering stay where they are not rendered again
-    #[arg(long)]
-    pub(crate) overwrite: bool,
-    /// Go on with the frames in DIR, which must be of the same rendering; also while others do so with other --frames
-    #[arg(long, conflicts_with = "overwrite")]
-    pub(crate) skip_existing: bool,
-    /// What to put behind the PNG files: transparent, black, white or r,g,b in 0..1
-    #[arg(long, value_name = "COLOR", default_value = "transparent", value_parser = picture_background)]
-    pub(crate) background: PictureBackground,
-}
-
-/// The cameras to render.
-#[derive(Args, Debug)]
-#[group(required = true, multiple = false)]
-pub(crate) struct CameraPath {
-    /// The cameras of a transforms.json
-    #[arg(long, value_name = "FILE")]
-    pub(crate) cameras: Option<PathBuf>,
-    /// N cameras in a circle around the scene
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub(crate) orbit: Option<u32>,
-}
-
 /// `nerf eval`
 #[derive(Args, Debug)]
 pub(crate) struct Eval {
@@ -222,6 +171,9 @@ pub(crate) struct Eval {
     /// What to put behind photo and rendering
     #[arg(long, value_enum, default_value = "black")]
     pub(crate) background: Shade,
+    /// Samples per pixel
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) spp: u32,
     /// Write the renderings, over the background, as PNG to this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) save: Option<PathBuf>,

@@ -22,6 +22,7 @@ mod sizes;
 mod space;
 pub mod stages;
 pub mod state;
+mod supersampling;
 pub mod trainer;
 pub mod training_views;
 pub mod variants;

@@ -4,6 +4,7 @@
 //! dataset's own, in its own units.
 
 mod alpha_probe;
+mod camera_list;
 mod depth;
 mod file_names;
 mod folders;
@@ -34,9 +35,9 @@ use crate::camera::{Bounds, Camera};
 use crate::capture::diagnostics::Diagnostic;
 use crate::capture::focus;
 use crate::photo::{BitDepth, Reading, Split};
+pub use camera_list::{UsualView, read_cameras};
 pub use intrinsics::Intrinsics;
 pub use listing::{DepthEntry, DepthScale, FrameEntry, Listing, SceneBox};
-pub use open::read_cameras;
 pub use splits::{HoldOut, evenly_spaced, spread_order};
 
 /// A dataset: what is listed, what was found, and what was assumed.

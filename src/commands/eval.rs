@@ -38,6 +38,7 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
     let mut evaluator = Evaluator::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);
     evaluator.background = args.background.color();
+    evaluator.samples = args.spp;
     let scores = measure(evaluator, &indices, &pictures, session)?;
     let means = Means::of(&scores).context("there was nothing to measure")?;
     session.console.fog(means.near_share);

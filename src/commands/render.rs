@@ -1,15 +1,17 @@
 //! `nerf render`: a trained field seen from any cameras.
 
 mod frame_folder;
+mod framing;
 
 use super::Session;
 use crate::cli::{Format, PictureBackground, Render};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use frame_folder::{Earlier, FrameFolder};
-use nerf::camera::Bounds;
-use nerf::camera::{Camera, LensKind};
-use nerf::capture::dataset::read_cameras;
+use framing::{framed, samples};
+use nerf::camera::orbit::Orbit;
+use nerf::camera::{Bounds, Camera, LensKind};
+use nerf::capture::dataset::{UsualView, read_cameras};
 use nerf::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::field::renderer::{Renderer, View};
 use nerf::photo::color_space::{ColorSpace, depth_srgb8, opaque_srgb8};
@@ -29,6 +31,8 @@ struct Job {
     index: usize,
     source: String,
     camera: Camera,
+    /// Samples per pixel.
+    samples: u32,
 }
 
 /// Most pixels along a side of a rendered image.
@@ -66,6 +70,7 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
         let lenses = LensKind::among(jobs.iter().map(|job| &job.camera));
         let mut renderer = field.renderer(&gpu, &lenses)?;
         let writer = Writer { args, color_space: field.color_space(), depth_range: range, folder };
+        say_samples(args, &jobs, session);
         let progress = Progress::new(session.console, "rendering");
         session.end_gracefully()?;
         seconds = render_and_write(&mut renderer, &jobs, writer, &progress)?;
@@ -109,6 +114,8 @@ fn rendering(args: &Render, field: &TrainedField, path: &[Job], depth_range: [f6
         "half": args.half,
         "depth": args.depth,
         "background": background,
+        "spp": args.spp,
+        "far_depth": args.far_depth.map(|depth| depth.to_string()),
     });
     set("settings", settings);
     listing
@@ -127,6 +134,16 @@ fn warn_of_full_disk(args: &Render, jobs: &[Job], session: &Session<'_>) {
             bytes(pixels * per_pixel),
             args.out.display(),
             bytes(available)
+        ));
+    }
+}
+
+/// Says where several samples per pixel are taken unasked.
+fn say_samples(args: &Render, jobs: &[Job], session: &Session<'_>) {
+    let most = jobs.iter().map(|job| job.samples).max().unwrap_or(1);
+    if args.spp.is_none() && most > 1 {
+        session.console.say(&format!(
+            "{most} samples per pixel, since the pixels are coarser than those of the training photos; --spp 1 takes one"
         ));
     }
 }
@@ -151,7 +168,7 @@ fn render_and_write(
             let mut seconds = Vec::with_capacity(jobs.len());
             for (number, job) in jobs.iter().enumerate() {
                 let clock = Instant::now();
-                let view = renderer.render(&job.camera)?;
+                let view = renderer.render_sampled(&job.camera, job.samples)?;
                 seconds.push(clock.elapsed().as_secs_f64());
                 // Nobody receives it where writing failed, which is reported below.
                 if sender.send((job, view)).is_err() {
@@ -171,12 +188,12 @@ fn render_and_write(
 /// All cameras of the path.
 fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
     let metadata = field.metadata();
-    let [width, height] = metadata.image_size;
     let cameras: Vec<(String, Camera)> = match (&args.path.cameras, args.path.orbit) {
         (Some(file), _) => {
-            let default_size = [args.width, args.height].into_iter().collect::<Option<Vec<_>>>();
-            let default_size = default_size.map_or([width, height], |size| [size[0], size[1]]);
-            read_cameras(file, default_size)?
+            let Orbit { width, focal_px, .. } = metadata.orbit;
+            let size = metadata.image_size;
+            let focal_px = focal_px * f64::from(size[0]) / f64::from(width);
+            read_cameras(file, UsualView { size, focal_px })?
         }
         (None, count) => {
             let cameras = metadata.orbit.cameras(metadata.bounds.center, count.unwrap_or(1) as usize);
@@ -185,10 +202,11 @@ fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
         }
     };
     let job = |(index, (source, camera)): (usize, (String, Camera))| {
-        let camera = resized(camera, args.width, args.height);
-        Job { index, source, camera }
+        let camera = framed(camera, args)?;
+        let samples = samples(&camera, metadata, args);
+        Ok(Job { index, source, camera, samples })
     };
-    Ok(cameras.into_iter().enumerate().map(job).collect())
+    cameras.into_iter().enumerate().map(job).collect()
 }
 
 /// Leaves the frames that are to be rendered.
@@ -230,19 +248,6 @@ fn apart_from_photos(args: &Render, jobs: &[Job]) -> Result<()> {
     Ok(())
 }
 
-/// The camera at the size asked for; a side that is not given follows.
-fn resized(camera: Camera, width: Option<u32>, height: Option<u32>) -> Camera {
-    let follow = |side: u32, other: u32, other_was: u32| {
-        (f64::from(side) * f64::from(other) / f64::from(other_was)).round().max(1.0) as u32
-    };
-    match (width, height) {
-        (None, None) => camera,
-        (Some(width), Some(height)) => camera.resized(width, height),
-        (Some(width), None) => camera.resized(width, follow(camera.height, width, camera.width)),
-        (None, Some(height)) => camera.resized(follow(camera.width, height, camera.height), height),
-    }
-}
-
 /// The same for all frames, so that a film does not flicker: the inner cube as the cameras see it.
 fn depth_range(bounds: &Bounds, jobs: &[Job]) -> [f64; 2] {
     let reach = 3f64.sqrt() * bounds.half;
@@ -267,13 +272,18 @@ impl Writer<'_> {
         if args.format.contains(&Format::Exr) {
             let file = format!("{stem}.exr");
             let color = self.color_space.linear(&view.color);
-            let pixels = ExrPixels { color: &color, depth: Some(&view.depth) };
+            let depth = self.depth(view);
+            let pixels = ExrPixels { color: &color, depth: Some(&depth) };
             let precision = if args.half { Precision::Half } else { Precision::Float };
             write_exr(&args.out.join(&file), view.width, view.height, &pixels, precision)?;
             files.insert("exr".to_owned(), json!(file));
         }
         if args.depth {
-            let pixels = depth_srgb8(&view.depth, &view.color, self.depth_range.map(|z| z as f32));
+            let mut pixels = depth_srgb8(&self.depth(view), &view.color, self.depth_range.map(|z| z as f32));
+            if args.far_depth.is_some() {
+                let empty = pixels.iter_mut().zip(&view.depth).filter(|(_, depth)| **depth == 0.0);
+                empty.for_each(|(pixel, _)| pixel[3] = u8::MAX);
+            }
             files.insert("depth".to_owned(), self.write_png(format!("{stem}_depth.png"), view, &pixels)?);
         }
         let frame = json!({
@@ -281,9 +291,16 @@ impl Writer<'_> {
             "source": job.source,
             "width": view.width,
             "height": view.height,
+            "spp": job.samples,
             "files": files,
         });
         self.folder.add(job.index, frame)
+    }
+
+    /// The depth of every pixel, where there is none as asked for.
+    fn depth(&self, view: &View) -> Vec<f32> {
+        let far = self.args.far_depth.unwrap_or(0.0);
+        view.depth.iter().map(|&depth| if depth > 0.0 { depth } else { far }).collect()
     }
 
     fn write_png(&self, file: String, view: &View, pixels: &[[u8; 4]]) -> Result<Value> {

@@ -16,6 +16,8 @@ use std::time::Instant;
 pub struct Evaluator<'a> {
     /// What is behind photo and rendering, display-referred.
     pub background: [f32; 3],
+    /// Samples per pixel of a rendering.
+    pub samples: u32,
     renderer: Renderer,
     /// The field's colour space.
     color_space: ColorSpace,
@@ -51,7 +53,7 @@ impl<'a> Evaluator<'a> {
     #[must_use]
     pub fn new(renderer: Renderer, color_space: ColorSpace, dataset: &'a Dataset) -> Self {
         let onlookers = Onlookers::of(dataset);
-        Self { background: [0.0; 3], renderer, color_space, dataset, onlookers, kept: Vec::new() }
+        Self { background: [0.0; 3], samples: 1, renderer, color_space, dataset, onlookers, kept: Vec::new() }
     }
 
     /// Renders frame `index` and compares it with its photo, where the photo's pixels count.
@@ -60,7 +62,7 @@ impl<'a> Evaluator<'a> {
     /// When the device was lost, or its interrupt was raised.
     pub fn compare(&mut self, index: usize, photo: &Photo) -> Result<Compared> {
         let frame = &self.dataset.frames[index];
-        let view = self.renderer.render(&frame.camera)?;
+        let view = self.renderer.render_sampled(&frame.camera, self.samples)?;
         let rendered = self.color_space.over(&view.color, self.background);
         let target = photo_over(&photo.image, self.background);
         let (width, height) = (view.width as usize, view.height as usize);

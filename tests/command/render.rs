@@ -1,6 +1,7 @@
 //! Folders of rendered frames, and of test views saved as pictures: nothing is mixed, and nothing is replaced unasked.
 
 use crate::program::{generated, nerf, object, place, quietly, text, train};
+use nerf::capture::image_file::read_exr_channel;
 use predicates::str::contains;
 use serde_json::Value;
 use std::fs;
@@ -39,6 +40,37 @@ fn listed(out: &Path) -> Vec<u64> {
     there.sort();
     assert_eq!(there, files, "nothing is left behind");
     frames.iter().map(|frame| frame["index"].as_u64().expect("a number")).collect()
+}
+
+/// A channel of the first frame of an orbit, with the flags `further`; rows of it.
+fn orbit_channel(name: &str, further: &[&str]) -> Vec<Vec<f32>> {
+    let out = place("framed");
+    let orbit = ["--orbit", "1", "--format", "exr"];
+    object(&render(&FIELD, &out, &[&orbit[..], further].concat()));
+    let (width, _, values) = read_exr_channel(&out.join("0000.exr"), name).expect("the channel");
+    values.chunks(width as usize).map(<[f32]>::to_vec).collect()
+}
+
+#[test]
+fn views_of_another_aspect_are_wider_and_not_stretched() {
+    let square = orbit_channel("R", &["--width", "16", "--spp", "1"]);
+    let wide = orbit_channel("R", &["--width", "32", "--height", "16", "--spp", "1"]);
+    assert_eq!((wide.len(), wide[0].len()), (16, 32));
+    let middle: Vec<&[f32]> = wide.iter().map(|row| &row[8..24]).collect();
+    let difference = square.iter().zip(middle).flat_map(|(row, other)| row.iter().zip(other));
+    let largest = difference.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(largest < 0.01, "{largest}");
+    let coarse = orbit_channel("A", &["--width", "4", "--spp", "1"]);
+    let automatic = orbit_channel("A", &["--width", "4"]);
+    assert_ne!(coarse, automatic, "16 samples");
+    assert_eq!(automatic, orbit_channel("A", &["--width", "4", "--spp", "16"]));
+    let (depth, far) = (
+        orbit_channel("Z", &["--width", "16", "--fov", "120"]),
+        orbit_channel("Z", &["--width", "16", "--fov", "120", "--far-depth", "100"]),
+    );
+    let pairs: Vec<_> = depth.iter().flatten().zip(far.iter().flatten()).collect();
+    assert!(pairs.iter().any(|(z, _)| **z == 0.0));
+    assert!(pairs.iter().all(|&(&z, &far)| far == if z == 0.0 { 100.0 } else { z }));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::support::{folder, shared};
 use nerf::camera::Lens;
-use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions, read_cameras};
+use nerf::capture::dataset::{Dataset, HoldOut, OpenOptions, UsualView, read_cameras};
 use nerf::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::photo::AlphaMode;
 
@@ -198,7 +198,7 @@ fn cameras_are_read_without_images() {
     let frames = [frame("b", POSE, ", \"w\": 64, \"h\": 48"), frame("a", POSE, "")];
     let text = format!("{{\"camera_angle_x\": 0.7, \"frames\": [{}]}}", frames.join(","));
     std::fs::write(&path, text).expect("writable");
-    let cameras = read_cameras(&path, [320, 240]).expect("valid");
+    let cameras = read_cameras(&path, UsualView { size: [320, 240], focal_px: 300.0 }).expect("valid");
     let sizes: Vec<_> = cameras.iter().map(|(name, c)| (name.as_str(), c.width)).collect();
     assert_eq!(sizes, [("b", 64), ("a", 320)]);
 }

@@ -97,18 +97,6 @@ fn thin_out(train: &mut Vec<usize>, most: Option<usize>, notes: &mut Notes) {
     }
 }
 
-/// Reads the cameras of a single file, in its order, without looking for images: name and camera. Sizes
-/// come from the file, else `default_size` in pixels.
-pub fn read_cameras(path: &Path, default_size: [u32; 2]) -> Result<Vec<(String, Camera)>> {
-    let camera = |entry: FrameEntry| {
-        let size = entry.declared_size().unwrap_or(default_size);
-        let camera = entry.intrinsics.camera(size, entry.world_from_camera).0;
-        (entry.file_path, camera)
-    };
-    let listings = transforms::read(&[path], &mut Notes::default())?;
-    Ok(listings.into_iter().flat_map(|listing| listing.frames).map(camera).collect())
-}
-
 /// The files to read, training first, each with the split it stands for.
 fn sources(path: &Path, notes: &mut Notes) -> Result<Vec<(Option<Split>, PathBuf)>> {
     if path.is_file() {

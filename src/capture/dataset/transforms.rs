@@ -51,8 +51,12 @@ pub fn parse(text: &str) -> Result<Listing> {
 
 /// As [`parse`], without a look at whether poses are mirrored.
 pub(super) fn parse_alone(text: &str) -> Result<Listing> {
-    let document = json::parse(text)?;
-    let sections = outline::sections(&document)?;
+    parse_document(&json::parse(text)?)
+}
+
+/// As [`parse_alone`], of JSON that was parsed.
+pub(super) fn parse_document(document: &Value) -> Result<Listing> {
+    let sections = outline::sections(document)?;
     let mut notes = Notes::default();
     let mut entries = Vec::new();
     let mut unposed = Vec::new();
@@ -139,6 +143,11 @@ impl<'a> File<'a> {
 fn stated(fields: Fields, owner: &str, notes: &mut Notes) -> Result<Vec<Stated>> {
     let nested = fields.objects(&intrinsics::OBJECTS);
     std::iter::once(fields).chain(nested).map(|fields| Stated::read(fields, owner, notes)).collect()
+}
+
+/// Whether a frame names its image.
+pub(super) fn has_name(frame: Fields) -> bool {
+    frame.has(&NAME_KEYS)
 }
 
 /// The name of the image, with forward slashes.
