@@ -204,3 +204,16 @@ fn a_broken_pipe_is_success() {
     drop(child.stdout.take());
     assert_eq!(child.wait().expect("ends").code(), Some(0));
 }
+
+/// Mesa's complaint about a machine without a desktop looks like an error of ours.
+#[test]
+fn drivers_do_not_complain_about_the_environment() {
+    for folder in [None, Some(""), Some("relative"), Some("/nowhere")] {
+        let mut command = nerf();
+        match folder {
+            None => command.env_remove("XDG_RUNTIME_DIR"),
+            Some(folder) => command.env("XDG_RUNTIME_DIR", folder),
+        };
+        command.arg("adapters").assert().success().stderr("");
+    }
+}
