@@ -5,4 +5,6 @@ pub mod diagnostics;
 pub(crate) mod focus;
 pub mod health;
 pub mod image_file;
+mod point_cloud;
 pub(crate) mod scene_box;
+mod surfaces;

@@ -16,6 +16,9 @@ pub struct Bounds {
     pub cascades: u32,
     /// How the box was found, one sentence.
     pub source: String,
+    /// Whether nothing tells how far the scene reaches.
+    #[serde(default)]
+    pub is_guess: bool,
 }
 
 impl Bounds {

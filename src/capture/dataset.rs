@@ -24,6 +24,7 @@ mod resolved_frames;
 mod search;
 mod sidecars;
 mod splits;
+mod surfaces;
 pub mod transforms;
 
 use std::collections::{HashMap, HashSet};

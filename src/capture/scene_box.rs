@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::dataset::SceneBox;
 use super::dataset::notes::Notes;
 use super::focus::{Focus, FocusKind, OpticalAxis, find, median};
+use super::surfaces::{Extent, Surfaces};
 use crate::camera::{Bounds, Camera, Ray};
 
 /// What is known about the surroundings of the subject.
@@ -19,6 +20,11 @@ pub(super) enum Surroundings {
 }
 
 const MAX_CASCADES: u32 = 8;
+/// Surfaces around cameras that look outwards are no farther away than so many times the cameras from their middle, as a
+/// rule: people turn round within a metre, in rooms and in yards.
+const INSIDE: f64 = 120.0;
+/// What is known to reach so far needs a little more.
+const MARGIN: f64 = 1.1;
 
 impl Bounds {
     /// The box of the file where it holds what the cameras look at, else the box found from the cameras.
@@ -26,27 +32,44 @@ impl Bounds {
         cameras: &[&Camera],
         scene_box: Option<SceneBox>,
         surroundings: Surroundings,
+        surfaces: impl FnOnce(&mut Notes) -> Option<Surfaces>,
         notes: &mut Notes,
     ) -> Self {
         let axes: Vec<OpticalAxis> = cameras.iter().map(|camera| OpticalAxis::of(camera)).collect();
         let focus = find(&axes);
-        let found = Self::found(&axes, &focus, surroundings);
-        let Some(scene_box) = scene_box else {
-            return found;
-        };
-        let stated = Self::stated(scene_box);
-        match stated.misses(&axes, &focus) {
-            None => stated,
-            Some(reason) => {
-                notes.warn(format!(
-                    "the scene box in the file (center {:.4}, half side {:.4}) is not used: {reason}; \
-                     the box found from the cameras is",
-                    stated.center,
-                    stated.outer_half()
-                ));
-                found
-            }
+        if let Some(scene_box) = scene_box {
+            let stated = Self::stated(scene_box);
+            let Some(reason) = stated.misses(&axes, &focus) else { return stated };
+            notes.warn(format!(
+                "the scene box in the file (center {:.4}, half side {:.4}) is not used: {reason}; \
+                 the box found from the cameras is",
+                stated.center,
+                stated.outer_half()
+            ));
         }
+        let found = Self::found(&axes, &focus, surroundings);
+        if !found.is_guess {
+            return found;
+        }
+        let surfaces = surfaces(notes);
+        let around = surfaces.and_then(|surfaces| Self::around(&surfaces, &axes, surroundings));
+        around.unwrap_or(found)
+    }
+
+    /// The box around surfaces that are known, and the cameras that see them.
+    fn around(surfaces: &Surfaces, axes: &[OpticalAxis], surroundings: Surroundings) -> Option<Self> {
+        let Extent { center, half, reach } = surfaces.extent()?;
+        let cameras = axes.iter().map(|axis| (axis.origin - center).abs().max_element());
+        let (half, reach) = (MARGIN * half, MARGIN * cameras.fold(reach, f64::max));
+        let is_object = surroundings == Surroundings::Empty;
+        Some(Self {
+            center,
+            half: if is_object { reach.max(half) } else { half },
+            // Behind what is known there may be more.
+            cascades: if is_object { 1 } else { doublings(half, reach).clamp(1, MAX_CASCADES - 1) + 1 },
+            source: format!("found around {}", surfaces.source),
+            is_guess: false,
+        })
     }
 
     fn stated(scene_box: SceneBox) -> Self {
@@ -56,6 +79,7 @@ impl Bounds {
             half: 0.5 / scale,
             cascades: aabb_scale.trailing_zeros() + 1,
             source: format!("stated in the file (aabb_scale {aabb_scale}, scale {scale:.4})"),
+            is_guess: false,
         }
     }
 
@@ -101,6 +125,7 @@ impl Bounds {
                 half: footprint(axes, focus),
                 cascades: 1,
                 source: format!("found {whose}, as wide as their view; no background"),
+                is_guess: focus.kind == FocusKind::Ahead,
             };
         }
         let distance = focus.distance;
@@ -111,15 +136,26 @@ impl Bounds {
         };
         let farthest = axes.iter().map(|axis| axis.origin - focus.point);
         let farthest = farthest.map(|d| d.abs().max_element()).fold(0.0, f64::max);
-        let reach = f64::max(5.0 * distance, 2.0 * farthest);
-        let doublings = (reach / half).log2().ceil().max(0.0) as u32;
+        let (reach, how_far) = match focus.kind {
+            // How far away what they look at is, only their pictures could tell.
+            FocusKind::Inside => {
+                (f64::max(INSIDE * distance, 0.5 * INSIDE * farthest), "far beyond them, which is a guess")
+            }
+            _ => (f64::max(5.0 * distance, 2.0 * farthest), "well behind them"),
+        };
         Self {
             center: focus.point,
             half,
-            cascades: (doublings + 1).min(MAX_CASCADES),
-            source: format!("found {whose}, doubled until it reaches well behind them"),
+            cascades: (doublings(half, reach) + 1).min(MAX_CASCADES),
+            source: format!("found {whose}, doubled until it reaches {how_far}"),
+            is_guess: matches!(focus.kind, FocusKind::Ahead | FocusKind::Inside),
         }
     }
+}
+
+/// How often half a side must be doubled to reach so far.
+fn doublings(half: f64, reach: f64) -> u32 {
+    (reach / half).log2().ceil().max(0.0) as u32
 }
 
 /// Half the width of the typical view at the focus, in world units.
@@ -175,7 +211,7 @@ mod tests {
     fn choose(cameras: &[Camera], file: Option<SceneBox>, around: Surroundings) -> (Bounds, usize) {
         let mut notes = Notes::default();
         let cameras: Vec<_> = cameras.iter().collect();
-        let bounds = Bounds::choose(&cameras, file, around, &mut notes);
+        let bounds = Bounds::choose(&cameras, file, around, |_| None, &mut notes);
         (bounds, notes.finish().len())
     }
 

@@ -212,7 +212,7 @@ mod tests {
         let open = |base| Grid { base, ..Grid::default() };
         let space = |cascades| {
             let source = String::new();
-            Space::from(&Bounds { center: DVec3::ZERO, half: 1.0, cascades, source })
+            Space::from(&Bounds { center: DVec3::ZERO, half: 1.0, cascades, source, is_guess: false })
         };
         // 200 px / 4 = 50 pixels per unit, 100 across the box of side 2, 150 cells.
         assert_eq!(finest_resolution(&open(16), &space(1), &cameras), 150);

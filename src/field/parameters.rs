@@ -262,7 +262,8 @@ mod tests {
         let mut config = Config::default();
         config.grid.finest = 64;
         config.occupancy.cells = 16;
-        let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades: 2, source: String::new() };
+        let bounds =
+            Bounds { center: DVec3::ZERO, half: 1.0, cascades: 2, source: String::new(), is_guess: false };
         let plan = Plan::suited_to(Capabilities::GPU, config, SceneFeatures::default(), (&bounds).into());
         let (entries, quads) = (plan.layout.entries, plan.layout.quads);
         let arrays: Vec<_> =

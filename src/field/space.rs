@@ -8,8 +8,10 @@ use crate::camera::Bounds;
 use crate::config::March;
 use glam::DVec3;
 
-/// Most cells per axis of a hash grid over cascades, whose far cubes no view sees as sharply as the inner one.
+/// Most cells per axis of a hash grid over cascades, whose far cubes no view sees as sharply as the inner one, …
 const MOST_CELLS_OF_CASCADES: f64 = 4096.0;
+/// … unless that leaves the inner cube fewer than this.
+const CELLS_OF_INNER_CUBE: f64 = 128.0;
 /// Most cells per axis of any hash grid.
 const MOST_CELLS: f64 = 65536.0;
 
@@ -106,7 +108,10 @@ impl Space {
     /// Most cells per axis that a hash grid has use for.
     #[must_use]
     pub fn most_grid_cells(&self) -> f64 {
-        if self.is_bounded() { MOST_CELLS } else { MOST_CELLS_OF_CASCADES }
+        match self.is_bounded() {
+            true => MOST_CELLS,
+            false => f64::max(MOST_CELLS_OF_CASCADES, CELLS_OF_INNER_CUBE * self.cubes_per_box()),
+        }
     }
 
     /// Distance of a point from the centre in world units, but no less than a tenth of the inner cube's half side.

@@ -163,7 +163,8 @@ mod tests {
     /// No cell that a pixel's ray goes through before it meets anything opaque may be taken for hidden.
     #[test]
     fn cells_on_rays_are_seen_through_every_lens() {
-        let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades: 1, source: String::new() };
+        let bounds =
+            Bounds { center: DVec3::ZERO, half: 1.0, cascades: 1, source: String::new(), is_guess: false };
         let space = Space::from(&bounds);
         let cells = 16;
         for lens in [

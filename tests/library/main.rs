@@ -12,6 +12,7 @@ mod malformed;
 mod photos;
 mod reference;
 mod scene;
+mod scene_box;
 mod shaders;
 mod stability;
 #[path = "../support/mod.rs"]

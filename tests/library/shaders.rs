@@ -47,7 +47,7 @@ fn plan(memory: TensorMemory, cascades: u32) -> Plan {
     let mut config = Config::default();
     config.grid.finest = 2048;
     let features = SceneFeatures { alpha: true, ..SceneFeatures::default() };
-    let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades, source: String::new() };
+    let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades, source: String::new(), is_guess: false };
     let product = Product { rows: 2, shared_weights: false };
     let adapter = Capabilities { memory, ..Capabilities::GPU };
     Plan {

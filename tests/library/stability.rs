@@ -80,7 +80,7 @@ impl Scene {
     }
 
     fn bounds(&self) -> Bounds {
-        Bounds { center: DVec3::ZERO, half: self.scale, cascades: 1, source: String::new() }
+        Bounds { center: DVec3::ZERO, half: self.scale, cascades: 1, source: String::new(), is_guess: false }
     }
 
     fn train(&self) -> Training {

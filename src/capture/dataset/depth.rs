@@ -114,6 +114,16 @@ impl Frame {
         (self.at_its_size(raw), part)
     }
 
+    /// Depth at the camera's size, in world units, before there is a scene box: 0 where it is unknown, infinite or larger
+    /// where it stands for far away; empty without a file.
+    ///
+    /// # Errors
+    /// As [`Dataset::load_depth`].
+    pub(super) fn unlimited_depth(&self) -> Result<Vec<f32>> {
+        let Some(file) = &self.source.sidecars.depth else { return Ok(Vec::new()) };
+        Ok(self.at_its_size(file.load(self.source.stored, self.source.upright_size())?))
+    }
+
     fn at_its_size(&self, raw: RawDepth) -> Vec<f32> {
         let depth = self.fitted(raw.values, raw.size);
         reduce_depth(&depth, self.source.window.size, [self.camera.width, self.camera.height])

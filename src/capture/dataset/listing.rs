@@ -13,6 +13,8 @@ pub struct Listing {
     pub frames: Vec<FrameEntry>,
     /// The scene box of instant-ngp's keys, if the file has one of them.
     pub scene_box: Option<SceneBox>,
+    /// A point cloud of the scene in the same coordinates, as the file spells it, with forward slashes.
+    pub point_cloud: Option<String>,
     /// Which family of tools writes such files.
     pub dialect: &'static str,
     pub(super) notes: Notes,

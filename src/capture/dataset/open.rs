@@ -11,7 +11,7 @@ use super::photo_files;
 use super::resolved_frames::{Built, Present, entries, resolve};
 use super::search::Search;
 use super::transforms;
-use super::{Dataset, HoldOut, OpenOptions, Split, splits};
+use super::{Dataset, HoldOut, OpenOptions, Split, splits, surfaces};
 use crate::camera::Bounds;
 use crate::camera::Camera;
 use crate::capture::scene_box::Surroundings;
@@ -32,12 +32,14 @@ impl Dataset {
         let root = folder_of(&sources[0].1);
         let mut lists = Vec::new();
         let mut scene_box = None;
+        let mut point_cloud = None;
         let files: Vec<&Path> = sources.iter().map(|(_, path)| path.as_path()).collect();
         let listings = transforms::read(&files, &mut notes)?;
         let dialect = listings.first().map_or("", |listing| listing.dialect);
         for ((split, _), listing) in sources.iter().zip(listings) {
             // The training file speaks for the scene.
             scene_box = scene_box.or(listing.scene_box);
+            point_cloud = point_cloud.or(listing.point_cloud.clone());
             lists.push(entries(listing, *split, &mut notes));
         }
         let mut search = Search::new(&root);
@@ -66,7 +68,11 @@ impl Dataset {
             false => Surroundings::Unknown,
         };
         let cameras: Vec<&Camera> = used.iter().map(|&i| &frames[i].camera).collect();
-        let bounds = Bounds::choose(&cameras, scene_box, surroundings, &mut notes);
+        let known = |notes: &mut Notes| {
+            let cloud = point_cloud.and_then(|named| surfaces::of_cloud(&root, &named, &cameras, notes));
+            cloud.or_else(|| surfaces::of_depth(&probe.frames))
+        };
+        let bounds = Bounds::choose(&cameras, scene_box, surroundings, known, &mut notes);
         Ok(Self {
             root,
             files: sources.into_iter().map(|(_, path)| path).collect(),

@@ -74,13 +74,16 @@ pub(super) fn parse_document(document: &Value) -> Result<Listing> {
     report_unposed(&unposed, entries.len(), &mut notes)?;
     let around = sections.first().map_or(&[][..], |section| &section.around);
     let mut scene_box = None;
+    let mut point_cloud = None;
     for &file in around {
+        let named = file.get("ply_file_path").and_then(Value::as_str);
+        point_cloud = point_cloud.or(named.map(|name| name.replace('\\', "/")));
         split_lists::assign(file, &mut entries, &mut notes)?;
         scene_box = scene_box.or(SceneBox::read(file, &mut notes)?);
     }
     let first = sections.iter().find_map(|section| section.frames.first()?.1.as_object());
     let dialect = dialect::name(around.first().copied(), first.map(Fields));
-    Ok(Listing { frames: entries, scene_box, dialect, notes })
+    Ok(Listing { frames: entries, scene_box, point_cloud, dialect, notes })
 }
 
 /// Keys under which tools write the name of the image.

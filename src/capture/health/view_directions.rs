@@ -4,7 +4,7 @@ use super::roll::STEEP;
 use super::{CameraSet, Diagnostic, Spread};
 use crate::camera::orbit::Orbit;
 use crate::capture::focus::FocusKind;
-use crate::support::format::{count, length, percent};
+use crate::support::format::{count, length, percent, point};
 use glam::DVec3;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -117,12 +117,8 @@ impl ViewDirections {
                 length(self.distance.median),
                 percent(2.0 * extent / self.distance.median)
             )));
-        } else if scene.focus.kind == FocusKind::Ahead && !scene.dataset.bounds.source.starts_with("stated") {
-            findings.push(Diagnostic::note(
-                "the optical axes do not cross, so the distance of the scene box is a guess; if the result is blurred \
-                 or empty, write `aabb`: [[x, y, z], [x, y, z]], the corners of what to show, into the file",
-            ));
         }
+        findings.extend(guessed_box(scene));
         findings.extend(self.rolled(scene));
         findings
     }
@@ -148,6 +144,27 @@ impl ViewDirections {
             Diagnostic::note(message).about(frames)
         })
     }
+}
+
+/// What to do where nothing tells how far the scene reaches.
+fn guessed_box(scene: &CameraSet<'_>) -> Option<Diagnostic> {
+    let bounds = &scene.dataset.bounds;
+    // A box that is stated around the ground below an aerial grid is worse than the one that is found.
+    let (why, or_state_it) = match scene.focus.kind {
+        _ if !bounds.is_guess => return None,
+        FocusKind::Inside => (
+            "the cameras have no common point in view, as in a room",
+            ", or, if the result is foggy or empty, `aabb`: [[x, y, z], [x, y, z]], the corners of what the photos show, with \
+             `aabb_scale`: 4 for what lies around it",
+        ),
+        _ => ("the optical axes do not cross", ""),
+    };
+    Some(Diagnostic::note(format!(
+        "{why}, so how far away things are is not known before training, and the scene box is a guess: {} to each side \
+         of {}; a point cloud (`ply_file_path`) or depth files would tell{or_state_it}",
+        length(bounds.outer_half()),
+        point(bounds.center, bounds.half),
+    )))
 }
 
 fn arrangement(scene: &CameraSet<'_>, up: DVec3) -> Arrangement {

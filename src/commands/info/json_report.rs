@@ -35,6 +35,7 @@ impl Preflight<'_> {
                 "half": bounds.half,
                 "cascades": bounds.cascades,
                 "source": bounds.source,
+                "is_guess": bounds.is_guess,
             },
             "coverage": {
                 "box": self.survey.coverage.outer(),

@@ -136,9 +136,12 @@ impl Preflight<'_> {
     fn about_coverage(&self) -> Vec<String> {
         let coverage = &self.survey.coverage;
         let (outer, inner) = (coverage.outer(), coverage.inner());
-        let mut line = format!("the box fills {} of the pictures", outer.describe(percent));
+        let mut line = format!("{} of the pictures look into the box", outer.describe(percent));
         if self.dataset.bounds.cascades > 1 {
-            line += &format!(", its inner cube {}", inner.describe(percent));
+            line += &format!(", {} into its inner cube", inner.describe(percent));
+        }
+        if self.dataset.bounds.is_guess {
+            line += "; whether what they show lies in it is not known";
         }
         let mut lines = vec![line];
         if outer.min < 0.5 * outer.median {

@@ -17,7 +17,13 @@ pub(super) fn checkpoint() -> Checkpoint {
     let mut config = Config::default();
     let small = r#"{"grid": {"levels": 8, "finest": 40, "log2_table": 8}, "occupancy": {"cells": 16}}"#;
     config.merge(&serde_json::from_str(small).expect("JSON")).expect("valid");
-    let bounds = Bounds { center: DVec3::new(0.1, 0.2, 0.3), half: 1.5, cascades: 1, source: "x".into() };
+    let bounds = Bounds {
+        center: DVec3::new(0.1, 0.2, 0.3),
+        half: 1.5,
+        cascades: 1,
+        source: "x".into(),
+        is_guess: false,
+    };
     let features = SceneFeatures { alpha: true, ..SceneFeatures::default() };
     let metadata = Metadata {
         format: FORMAT,

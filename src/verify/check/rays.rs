@@ -74,7 +74,13 @@ pub fn begin_rays(bench: &Workbench, pixels: Range<usize>) {
 }
 
 fn bounds() -> Bounds {
-    Bounds { center: DVec3::new(0.5, -1.0, 2.0), half: 1.5, cascades: 1, source: String::new() }
+    Bounds {
+        center: DVec3::new(0.5, -1.0, 2.0),
+        half: 1.5,
+        cascades: 1,
+        source: String::new(),
+        is_guess: false,
+    }
 }
 
 /// A camera that looks at the box, its principal point off the centre; every second world is left-handed.

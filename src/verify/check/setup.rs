@@ -50,7 +50,13 @@ impl Setup {
             ..Config::default()
         };
         let features = SceneFeatures { alpha: true, ..SceneFeatures::default() };
-        let bounds = Bounds { center: DVec3::splat(0.5), half: 0.5, cascades: 1, source: "unit cube".into() };
+        let bounds = Bounds {
+            center: DVec3::splat(0.5),
+            half: 0.5,
+            cascades: 1,
+            source: "unit cube".into(),
+            is_guess: false,
+        };
         Self { config, features, bounds, product: None, memory: None }
     }
 
