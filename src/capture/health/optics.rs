@@ -29,7 +29,8 @@ const OTHER_FOCAL: f64 = 0.03;
 const FEW: f64 = 0.15;
 /// Pixels are square.
 const SQUARE: f64 = 0.02;
-const LEAST_FOV_DEGREES: f64 = 10.0;
+/// Aerial teles see 6° to 12°.
+const LEAST_FOV_DEGREES: f64 = 5.0;
 const MOST_FOV_DEGREES: f64 = 150.0;
 /// Farther off the middle, a picture was cropped or the numbers belong to another size.
 const FAR_OFF: f64 = 0.25;
