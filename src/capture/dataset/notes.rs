@@ -13,6 +13,9 @@ pub(crate) struct Notes {
     index: HashMap<String, usize>,
 }
 
+/// Words a message that tells a number.
+type Tell = fn(f64) -> String;
+
 #[derive(Clone, Debug)]
 struct Pending {
     severity: Severity,
@@ -20,46 +23,65 @@ struct Pending {
     remedy: Option<Remedy>,
     first_frame: Option<String>,
     count: usize,
+    /// The largest of the numbers that the message tells, and how.
+    worst: Option<(f64, Tell)>,
+}
+
+impl Pending {
+    fn new(severity: Severity, message: String) -> Self {
+        Self { severity, message, remedy: None, first_frame: None, count: 1, worst: None }
+    }
 }
 
 impl Notes {
     pub(crate) fn note(&mut self, message: impl Into<String>) {
-        self.add(Severity::Note, message.into(), None);
+        self.merge(Pending::new(Severity::Note, message.into()));
     }
 
     pub(crate) fn warn(&mut self, message: impl Into<String>) {
-        self.add(Severity::Warning, message.into(), None);
+        self.merge(Pending::new(Severity::Warning, message.into()));
     }
 
     /// What keeps training from beginning.
     pub(crate) fn error(&mut self, message: impl Into<String>) {
-        self.add(Severity::Error, message.into(), None);
+        self.merge(Pending::new(Severity::Error, message.into()));
     }
 
     /// A remark with something to do about it.
     pub(crate) fn advise(&mut self, severity: Severity, advised: Advised) {
         let message = advised.to_string();
-        self.merge(Pending { severity, message, remedy: Some(advised.remedy), first_frame: None, count: 1 });
+        self.merge(Pending { remedy: Some(advised.remedy), ..Pending::new(severity, message) });
     }
 
     /// A remark about one frame. Remarks that differ in numbers only become one, with the first numbers.
     pub(crate) fn frame(&mut self, severity: Severity, frame: &str, message: impl Into<String>) {
-        self.add(severity, message.into(), Some(frame));
+        self.merge(Pending { first_frame: Some(frame.to_owned()), ..Pending::new(severity, message.into()) });
     }
 
-    fn add(&mut self, severity: Severity, message: String, frame: Option<&str>) {
-        let first_frame = frame.map(Into::into);
-        self.merge(Pending { severity, message, remedy: None, first_frame, count: 1 });
+    /// A remark about one frame that tells a number: of many frames, the largest.
+    pub(crate) fn worst(&mut self, severity: Severity, frame: &str, number: f64, tell: Tell) {
+        let first_frame = Some(frame.to_owned());
+        let pending = Pending::new(severity, tell(number));
+        self.merge(Pending { first_frame, worst: Some((number, tell)), ..pending });
     }
 
     fn merge(&mut self, entry: Pending) {
-        let is_wording = |c: &char| !c.is_ascii_digit() && !matches!(c, '.' | '-');
+        let is_wording = |c: &char| !c.is_ascii_digit() && !matches!(c, '.' | '-' | 'e');
         let wording: String = match entry.first_frame {
             Some(_) => entry.message.chars().filter(is_wording).collect(),
             None => entry.message.clone(),
         };
         match self.index.get(&wording) {
-            Some(&at) => self.entries[at].count += entry.count,
+            Some(&at) => {
+                let known = &mut self.entries[at];
+                known.count += entry.count;
+                if let (Some((most, _)), Some((number, tell))) = (&mut known.worst, entry.worst)
+                    && number > *most
+                {
+                    *most = number;
+                    known.message = tell(number);
+                }
+            }
             None => {
                 self.index.insert(wording, self.entries.len());
                 self.entries.push(entry);
@@ -102,12 +124,16 @@ mod tests {
         notes.frame(Severity::Note, "frame 4", "the lens is odd");
         notes.note("2 frames");
         notes.note("3 frames");
+        for off in [1.0, 3e-4, 2.5, 2.0] {
+            notes.worst(Severity::Warning, "frame 5", off, |off| format!("off by up to {off:.1e}"));
+        }
         let messages: Vec<_> = notes.finish().into_iter().map(|note| note.message).collect();
         let expected = [
             "frame 3 and 1 more: the focal length is 1.5",
             "frame 4: the lens is odd",
             "2 frames",
             "3 frames",
+            "frame 5 and 3 more: off by up to 2.5e0",
         ];
         assert_eq!(messages, expected);
     }

@@ -4,7 +4,7 @@
 pub(super) mod handedness;
 
 use anyhow::{Context, Result, bail, ensure};
-use glam::{DAffine3, DMat3, DMat4, DVec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
 
 use super::json::{Fields, Matrix};
 use super::notes::Notes;
@@ -12,6 +12,8 @@ use crate::capture::diagnostics::Severity;
 
 /// Positions beyond this many world units are a mistake, and nothing that f32 can still tell apart.
 const FARTHEST: f64 = 1e12;
+/// A last row that is no further off 0 0 0 1 is noise, as scripts add it that disturb poses.
+const MOST_OFF: f64 = 0.1;
 
 /// What the columns of a file's rotations are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,21 +131,42 @@ fn upright(key: &str, stated: &Matrix, owner: &str, notes: &mut Notes) -> Result
     // Rows become columns here.
     let transposed = DMat4::from_cols_array(&rows);
     let matrix = transposed.transpose();
-    let strays = |matrix: DMat4| {
-        let bottom = matrix.row(3).truncate().abs().max_element();
-        bottom / (1.0 + matrix.w_axis.truncate().abs().max_element())
-    };
-    if strays(matrix) <= 1e-6 && !is_four_by_three {
+    if is_affine(matrix) && !is_four_by_three {
         return Ok(Some(matrix));
     }
-    ensure!(
-        strays(transposed) <= 1e-6 && transposed.w_axis.w != 0.0,
-        "`{key}` must end in the row 0 0 0 1, found {}; write it camera-to-world, row by row",
+    if is_affine(transposed) {
+        let message = "the matrix has its translation in the last row; it was transposed";
+        notes.frame(Severity::Note, owner, message);
+        return Ok(Some(transposed));
+    }
+    let off = |matrix: DMat4| (matrix.row(3) - DVec4::W).abs().max_element();
+    if off(matrix) <= MOST_OFF {
+        notes.worst(Severity::Warning, owner, off(matrix), |off| {
+            format!(
+                "the last row of the pose must be 0 0 0 1 and is off by up to {off:.2e}, as if noise had been added; the \
+                 first three rows are used"
+            )
+        });
+        let linear = DMat3::from_mat4(matrix);
+        return Ok(Some(DMat4::from(DAffine3::from_mat3_translation(linear, matrix.w_axis.truncate()))));
+    }
+    let what = match off(transposed) <= MOST_OFF {
+        true => "what looks like the translation of a transposed matrix, ",
+        false => "",
+    };
+    bail!(
+        "`{key}` must end in the row 0 0 0 1, found {what}{}; write it camera-to-world, row by row",
         matrix.row(3)
-    );
-    let message = "the matrix has its translation in the last row; it was transposed";
-    notes.frame(Severity::Note, owner, message);
-    Ok(Some(transposed))
+    )
+}
+
+/// Whether a matrix ends in the row 0 0 0 w, as far as that can be told beside its translation. Another w than 1 is
+/// a scale of the whole, unless it is so near to 1 that it is no scale.
+fn is_affine(matrix: DMat4) -> bool {
+    let row = matrix.row(3);
+    let strays = row.truncate().abs().max_element() / (1.0 + matrix.w_axis.truncate().abs().max_element());
+    let off = (row.w - 1.0).abs();
+    strays <= 1e-6 && row.w != 0.0 && (off <= 1e-6 || off > MOST_OFF)
 }
 
 /// The orthonormal matrix nearest to `linear` once its scale is taken out; it keeps the handedness.

@@ -315,6 +315,11 @@ pub(super) mod tests {
         ] {
             assert_eq!(read(same.clone()).0, expected, "{same}");
         }
+        for (last, largest) in [([0.0, 0.0, 0.0, 0.99], "1.00e-2"), ([1e-3, -0.02, 3e-5, 1.01], "2.00e-2")] {
+            let (found, said) = read(json!([[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], last]));
+            assert_eq!(found, expected, "{last:?}");
+            assert!(said.contains("must be 0 0 0 1 and is off by up to") && said.contains(largest), "{said}");
+        }
         let (noisy, said) = read(json!([[1.02, 0.01, 0, 1], [0, 0.99, 0, 2], [0, 0, 1, 3]]));
         let product = noisy.matrix3.transpose() * noisy.matrix3;
         assert!(product.abs_diff_eq(glam::DMat3::IDENTITY, 1e-14));
