@@ -8,3 +8,4 @@ pub mod image_file;
 mod point_cloud;
 pub(crate) mod scene_box;
 mod surfaces;
+pub mod unreadable;

@@ -64,8 +64,8 @@ pub struct Dataset {
     pub listed: usize,
     /// Names of the listed frames whose images are missing or cannot be read.
     pub missing: Vec<String>,
-    /// What is wrong with each image or mask whose header cannot be read, where
-    /// [`allow_missing`](OpenOptions::allow_missing) let it pass.
+    /// What is wrong with the images and masks whose headers cannot be read, a text for each kind, where
+    /// [`allow_missing`](OpenOptions::allow_missing) let them pass.
     pub damaged: Vec<String>,
     /// Whether the images are scene-linear.
     pub is_hdr: bool,

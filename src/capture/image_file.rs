@@ -3,12 +3,14 @@
 mod alpha;
 mod decode;
 mod depth;
+mod foreign;
 mod jpeg;
 mod mask;
 mod npy;
 mod open_exr;
 mod pixel_grid;
 mod reduce;
+mod tga;
 
 use std::path::Path;
 
@@ -22,6 +24,7 @@ use crate::support::file::write_atomically;
 pub(crate) use alpha::{Evidence, Multiplied};
 use decode::FileFormat;
 pub use depth::{DepthMap, load_depth};
+pub use foreign::Foreign;
 pub(crate) use mask::{MaskChannel, MaskFile};
 pub use open_exr::{ExrPixels, Precision, read_exr_channel, write_exr};
 pub use pixel_grid::{Turn, Window};
@@ -29,7 +32,7 @@ pub(crate) use pixel_grid::{crop, nearest};
 pub(crate) use reduce::{reduce_any, reduce_depth};
 
 /// The formats that [`Image::load`] reads, for messages.
-pub const FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP, OpenEXR or Radiance HDR";
+pub const FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP, TGA, PNM, OpenEXR or Radiance HDR";
 
 /// Most pixels of an image: more are a damaged header or a trap rather than a photo.
 pub const MOST_PIXELS: u64 = 1 << 28;
@@ -173,9 +176,20 @@ mod tests {
     }
 
     #[test]
+    fn tga_is_known_by_its_header() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let tga = folder.path().join("photo.tga");
+        let colors = ImageBuffer::from_fn(3, 2, |x, y| Rgb([x as u8, y as u8, 200]));
+        DynamicImage::ImageRgb8(colors).save(&tga).expect("writable");
+        let expected: Vec<_> = (0..6).map(|at| [at % 3, at / 3, 200, 255]).collect();
+        assert_eq!(Header::read(&tga).expect("readable").width, 3);
+        assert_eq!(Image::load(&tga).expect("readable").pixels, Pixels::Srgb8(expected));
+    }
+
+    #[test]
     fn other_files_are_refused_by_name_and_type() {
         let folder = tempfile::tempdir().expect("temporary folder");
-        for (bytes, expected) in [(&b"GIF89a......"[..], "found Gif"), (b"", "found 0 bytes")] {
+        for (bytes, expected) in [(&b"GIF89a......"[..], "found a GIF"), (b"", "found an empty file")] {
             let path = folder.path().join("photo.png");
             std::fs::write(&path, bytes).expect("writable");
             let message = format!("{:#}", Image::load(&path).expect_err("refused"));

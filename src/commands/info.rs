@@ -15,6 +15,7 @@ use nerf::capture::health::Survey;
 use nerf::capture::health::depth::DepthSurvey;
 use nerf::capture::health::gallery::{Gallery, Look};
 use nerf::capture::health::map;
+use nerf::capture::unreadable::{Kind, Unreadable, kinds};
 use nerf::config::Config;
 use nerf::gpu::Gpu;
 use nerf::photo::Reading;
@@ -129,16 +130,22 @@ fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> Result<(Ga
             session.check_interrupt()?;
             let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
             progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
+            let unreadable = |error| Unreadable { name: dataset.frames[index].name.clone(), error };
             match look {
                 Err(error) if is_transient(&error) => Err(error),
-                Err(error) => Ok(Err(Diagnostic::error(with_flags(&error)).about(vec![index]))),
+                Err(error) => Ok(Err((index, unreadable(error)))),
                 Ok(look) => Ok(Ok(look)),
             }
         })
         .collect();
     let (looks, failures): (Vec<_>, Vec<_>) = looks?.into_iter().partition(Result::is_ok);
     let looks = looks.into_iter().filter_map(Result::ok).collect();
-    Ok((Gallery { looks }, failures.into_iter().filter_map(Result::err).collect()))
+    let (indices, failures): (Vec<_>, Vec<_>) = failures.into_iter().filter_map(Result::err).unzip();
+    let problem = |kind: Kind| {
+        Diagnostic::error(kind.message)
+            .about(kind.members.into_iter().map(|member| indices[member]).collect())
+    };
+    Ok((Gallery { looks }, kinds(&failures, views.len(), "photos").into_iter().map(problem).collect()))
 }
 
 /// The result for what cannot even be opened.

@@ -149,6 +149,27 @@ fn mistakes_are_explained() {
 }
 
 #[test]
+fn unreadable_photos_are_one_message_for_each_kind() {
+    let folder = photos(40);
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n";
+    for index in 0..40 {
+        let content = if index % 10 == 9 { "" } else { pointer };
+        std::fs::write(folder.path().join(format!("images/{index}.png")), content).expect("writable");
+    }
+    let frames: Vec<_> = (0..40).map(|index| frame(&format!("images/{index}.png"), POSE, "")).collect();
+    let text = format!("{{\"camera_angle_x\": 0.7, \"frames\": [{}]}}", frames.join(","));
+    std::fs::write(folder.path().join("transforms.json"), text).expect("writable");
+    let options = OpenOptions { allow_missing: true, ..OpenOptions::default() };
+    let damaged = Dataset::open(folder.path(), &options).expect("looked at").damaged;
+    let lfs = "36 of 40 photos cannot be read (images/0.png, images/1.png, images/2.png, …): each is a Git LFS pointer in \
+               place of the picture; run `git lfs pull` in the dataset's folder";
+    assert_eq!((damaged.len(), damaged[0].as_str()), (2, lfs));
+    assert!(damaged[1].contains("4 of 40 photos") && damaged[1].contains("an empty file"), "{}", damaged[1]);
+    let message = Dataset::open(folder.path(), &OpenOptions::default()).expect_err("refused").to_string();
+    assert_eq!(message, damaged.join("; "));
+}
+
+#[test]
 fn oddities_are_tolerated() {
     let frames = [
         frame(

@@ -45,7 +45,7 @@ impl Dataset {
         let mut search = Search::new(&root);
         let mut resolved = Vec::new();
         for list in photo_files::find(lists, &mut search, &mut notes) {
-            resolved.extend(resolve(list, options.allow_missing, &mut notes)?);
+            resolved.extend(resolve(list, &mut notes));
         }
         let present = Present::new(resolved, &mut search, options, &mut notes)?;
         let bit_depth = present.bit_depth(&mut notes)?;

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Error, Result, ensure};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -18,9 +18,11 @@ use super::{Frame, OpenOptions, Split, mask, photo_files};
 use crate::capture::diagnostics::Severity;
 use crate::capture::image_file::Header;
 use crate::capture::image_file::Turn;
+use crate::capture::unreadable::{Unreadable, kinds};
 use crate::photo::BitDepth;
 use crate::photo::Reading;
 use crate::support::remedy::{Advised, Remedy};
+use crate::support::transient::is_transient;
 
 /// A listed frame and what was found of it.
 pub(super) struct ResolvedFrame {
@@ -28,7 +30,7 @@ pub(super) struct ResolvedFrame {
     /// That of its image, where there is one that can be read.
     header: Option<Header>,
     /// Why the image, which is there, cannot be read.
-    damage: Option<String>,
+    damage: Option<Error>,
 }
 
 /// All listed frames that a dataset goes on with.
@@ -64,11 +66,7 @@ pub(super) fn entries(mut listing: Listing, split: Option<Split>, notes: &mut No
 }
 
 /// Reads the headers of the images of one list, each image once.
-pub(super) fn resolve(
-    list: Vec<Sought>,
-    allow_damaged: bool,
-    notes: &mut Notes,
-) -> Result<Vec<ResolvedFrame>> {
+pub(super) fn resolve(list: Vec<Sought>, notes: &mut Notes) -> Vec<ResolvedFrame> {
     let mut seen = HashSet::new();
     let mut distinct = Vec::new();
     for sought in list {
@@ -82,20 +80,34 @@ pub(super) fn resolve(
     let inspect = |sought: Sought| {
         let header = sought.path().map(Header::read).transpose();
         match header.with_context(|| sought.entry.label.clone()) {
-            Ok(header) => Ok(ResolvedFrame { sought, header, damage: None }),
-            Err(error) if allow_damaged => {
-                Ok(ResolvedFrame { sought, header: None, damage: Some(format!("{error:#}")) })
-            }
-            Err(error) => Err(error),
+            Ok(header) => ResolvedFrame { sought, header, damage: None },
+            Err(error) => ResolvedFrame { sought, header: None, damage: Some(error) },
         }
     };
     distinct.into_par_iter().map(inspect).collect()
 }
 
+/// What is wrong with the images that are there and cannot be read, a text for each kind. Failures of the moment say
+/// nothing about the images, and are errors.
+fn damaged(resolved: &mut [ResolvedFrame]) -> Result<Vec<String>> {
+    let listed = resolved.len();
+    let mut damages = resolved.iter_mut().map(|frame| &mut frame.damage);
+    if let Some(error) =
+        damages.find(|damage| damage.as_ref().is_some_and(is_transient)).and_then(Option::take)
+    {
+        return Err(error);
+    }
+    let unreadable = |frame: &mut ResolvedFrame| {
+        Some(Unreadable { name: frame.sought.entry.file_path.clone(), error: frame.damage.take()? })
+    };
+    let unreadable: Vec<_> = resolved.iter_mut().filter_map(unreadable).collect();
+    Ok(kinds(&unreadable, listed, "photos").into_iter().map(|kind| kind.message).collect())
+}
+
 impl Present {
     /// Sets missing and damaged frames aside.
     pub(super) fn new(
-        resolved: Vec<ResolvedFrame>,
+        mut resolved: Vec<ResolvedFrame>,
         search: &mut Search,
         options: &OpenOptions,
         notes: &mut Notes,
@@ -103,7 +115,8 @@ impl Present {
         let listed = resolved.len();
         let unread = resolved.iter().filter(|frame| frame.header.is_none());
         let missing: Vec<_> = unread.map(|frame| frame.sought.entry.file_path.clone()).collect();
-        let damaged = resolved.iter().filter_map(|frame| frame.damage.clone()).collect();
+        let damaged = damaged(&mut resolved)?;
+        ensure!(options.allow_missing || damaged.is_empty(), damaged.join("; "));
         let nowhere: Vec<&Sought> =
             resolved.iter().map(|frame| &frame.sought).filter(|sought| sought.path().is_none()).collect();
         if !nowhere.is_empty() {
@@ -149,6 +162,7 @@ impl Present {
         let photos = self.resolved.iter().filter_map(|frame| frame.sought.path().map(Path::to_owned));
         let mut finder = Finder::new(search, photos.collect());
         let is_any_found = self.resolved.iter().any(|frame| frame.header.is_some());
+        let (mut unreadable, mut listed_masks) = (Vec::new(), 0);
         let mut members = Vec::new();
         let mut frames = Vec::new();
         for ResolvedFrame { sought, header, .. } in self.resolved {
@@ -157,9 +171,9 @@ impl Present {
             let frame = match found {
                 Some((path, header)) => {
                     let mut sidecars = finder.find(&entry, &path, notes);
+                    listed_masks += sidecars.masks.len();
                     if options.allow_missing {
-                        let errors = sidecars.drop_damaged_masks();
-                        damaged.extend(errors.iter().map(|error| format!("{}: {error:#}", entry.label)));
+                        unreadable.extend(sidecars.drop_damaged_masks(&entry.label));
                     }
                     frame(&entry, (path, header), sidecars, reading, notes)
                 }
@@ -170,6 +184,8 @@ impl Present {
             frames.push(frame);
         }
         mask::find_channels(&mut frames, options.allow_missing, notes)?;
+        let kinds = kinds(&unreadable, listed_masks, "masks");
+        damaged.extend(kinds.into_iter().map(|kind| kind.message));
         finder.tell_guesses(notes);
         remark_on_masks(&frames, &finder, is_any_found && reading.invert_masks, notes);
         Ok(Built { frames, members, damaged })

@@ -15,7 +15,7 @@ use std::collections::HashSet;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use super::depth::DepthFile;
 use super::file_names::with_extensions;
@@ -27,6 +27,7 @@ use super::notes::Notes;
 use super::search::{Found, Role, Search};
 use crate::capture::diagnostics::Severity;
 use crate::capture::image_file::Header;
+use crate::capture::unreadable::Unreadable;
 use crate::photo::BitDepth;
 
 /// The files beside one photo.
@@ -39,11 +40,15 @@ pub(super) struct Sidecars {
 }
 
 impl Sidecars {
-    /// Drops masks whose headers cannot be read, and says why they cannot.
-    pub(super) fn drop_damaged_masks(&mut self) -> Vec<anyhow::Error> {
-        let mut errors = Vec::new();
-        self.masks.retain(|mask| Header::read(&mask.path).map_err(|error| errors.push(error)).is_ok());
-        errors
+    /// Drops masks whose headers cannot be read, and says why they cannot; `owner` names the frame.
+    pub(super) fn drop_damaged_masks(&mut self, owner: &str) -> Vec<Unreadable> {
+        let mut unreadable = Vec::new();
+        self.masks.retain(|mask| {
+            let header = Header::read(&mask.path).with_context(|| owner.to_owned());
+            let name = || mask.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            header.map_err(|error| unreadable.push(Unreadable { name: name(), error })).is_ok()
+        });
+        unreadable
     }
 }
 

@@ -8,6 +8,8 @@ use ::image::codecs::bmp::BmpDecoder;
 use ::image::codecs::hdr::HdrDecoder;
 use ::image::codecs::jpeg::JpegDecoder;
 use ::image::codecs::png::PngDecoder;
+use ::image::codecs::pnm::PnmDecoder;
+use ::image::codecs::tga::TgaDecoder;
 use ::image::codecs::tiff::TiffDecoder;
 use ::image::codecs::webp::WebPDecoder;
 use ::image::metadata::Orientation;
@@ -15,7 +17,7 @@ use ::image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, Limits};
 use anyhow::{Context, Result, bail, ensure};
 
 use super::open_exr::finite;
-use super::{FORMATS, Header, check_size, jpeg};
+use super::{FORMATS, Foreign, Header, check_size, jpeg, tga};
 use crate::photo::{BitDepth, Image, Pixels};
 
 /// What decoders may ask for beyond the pixels: metadata, colour profiles, lookup tables.
@@ -38,15 +40,16 @@ impl FileFormat {
         if magic.starts_with(b"#?RGBE") {
             return Ok(Self::Common(ImageFormat::Hdr));
         }
-        use ImageFormat::{Bmp, Hdr, Jpeg, OpenExr, Png, Tiff, WebP};
-        match ::image::guess_format(&magic) {
+        use ImageFormat::{Bmp, Hdr, Jpeg, OpenExr, Png, Pnm, Tga, Tiff, WebP};
+        let guess = ::image::guess_format(&magic);
+        if let (Ok(Tiff), Some(raw)) = (&guess, Foreign::raw(path, &magic)) {
+            return Err(raw.into());
+        }
+        match guess {
             Ok(OpenExr) => Ok(Self::OpenExr),
-            Ok(format @ (Png | Jpeg | WebP | Tiff | Bmp | Hdr)) => Ok(Self::Common(format)),
-            Ok(other) => bail!("expected {FORMATS}, found {other:?}; convert the image"),
-            Err(_) => bail!(
-                "expected {FORMATS}, found {} bytes that are none of them",
-                std::fs::metadata(path)?.len()
-            ),
+            Ok(format @ (Png | Jpeg | WebP | Tiff | Bmp | Hdr | Pnm)) => Ok(Self::Common(format)),
+            _ if tga::is_tga(path, &magic)? => Ok(Self::Common(Tga)),
+            _ => Err(Foreign::of(path)?.into()),
         }
     }
 }
@@ -116,6 +119,8 @@ fn open(path: &Path, format: ImageFormat) -> Result<Box<dyn ImageDecoder>> {
             ImageFormat::Jpeg => Box::new(JpegDecoder::new(reader)?),
             ImageFormat::WebP => Box::new(WebPDecoder::new(reader)?),
             ImageFormat::Bmp => Box::new(BmpDecoder::new(reader)?),
+            ImageFormat::Pnm => Box::new(PnmDecoder::new(reader)?),
+            ImageFormat::Tga => Box::new(TgaDecoder::new(reader)?),
             ImageFormat::Hdr => Box::new(HdrDecoder::new_nonstrict(reader)?),
             ImageFormat::Tiff => {
                 let mut decoder = TiffDecoder::new(reader)?;
