@@ -60,6 +60,20 @@ fn advice(remedy: &Remedy) -> String {
                 .to_owned()
         }
         Remedy::RunFolder => "the folder that `nerf train --out` wrote".to_owned(),
+        Remedy::FindPoses { photos } => format!(
+            "run `ns-process-data images --data {photos} --output-dir OUT` (nerfstudio), or `colmap2nerf.py --images \
+             {photos} --run_colmap` (instant-ngp), then `nerf train OUT`"
+        ),
+        Remedy::FindPosesOfVideo { video } => format!(
+            "run `ns-process-data video --data {video} --output-dir OUT` (nerfstudio), or `colmap2nerf.py --video_in \
+             {video} --run_colmap` (instant-ngp), then `nerf train OUT`"
+        ),
+        Remedy::ConvertColmap { model } => format!(
+            "run `ns-process-data images --skip-colmap --colmap-model-path {model} --data IMAGES --output-dir OUT` \
+             (nerfstudio; its path counts from OUT), or `colmap model_converter --input_path {model} --output_path \
+             {model} --output_type TXT` and `colmap2nerf.py --images IMAGES --text {model}` (instant-ngp), then `nerf \
+             train OUT`"
+        ),
     }
 }
 

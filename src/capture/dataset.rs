@@ -13,6 +13,7 @@ mod intrinsics;
 mod json;
 mod listing;
 mod mask;
+mod not_a_dataset;
 pub(crate) mod notes;
 mod open;
 mod part;

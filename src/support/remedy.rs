@@ -58,6 +58,21 @@ pub enum Remedy {
     UsedFolder,
     /// The folder of a run.
     RunFolder,
+    /// Poses for photos.
+    FindPoses {
+        /// Their folder, as a shell has it.
+        photos: String,
+    },
+    /// Poses for the pictures of a video.
+    FindPosesOfVideo {
+        /// The file, as a shell has it.
+        video: String,
+    },
+    /// A COLMAP model as a transforms.json.
+    ConvertColmap {
+        /// Its folder, as a shell has it.
+        model: String,
+    },
 }
 
 impl fmt::Display for Remedy {
@@ -98,6 +113,18 @@ impl fmt::Display for Remedy {
             ),
             Self::UsedFolder => f.write_str("name another one, go on with the run in it, or replace it"),
             Self::RunFolder => f.write_str("the folder of a training run"),
+            Self::FindPoses { photos } => write!(
+                f,
+                "find the poses of the photos in {photos} with nerfstudio's ns-process-data or instant-ngp's colmap2nerf.py"
+            ),
+            Self::FindPosesOfVideo { video } => write!(
+                f,
+                "find the poses of {video} with nerfstudio's ns-process-data or instant-ngp's colmap2nerf.py"
+            ),
+            Self::ConvertColmap { model } => write!(
+                f,
+                "convert {model} to a transforms.json with nerfstudio's ns-process-data or instant-ngp's colmap2nerf.py"
+            ),
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, ensure};
 
 use super::alpha_probe::AlphaProbe;
 use super::listing::FrameEntry;
+use super::not_a_dataset;
 use super::notes::Notes;
 use super::photo_files;
 use super::resolved_frames::{Built, Present, entries, resolve};
@@ -106,6 +107,9 @@ fn thin_out(train: &mut Vec<usize>, most: Option<usize>, notes: &mut Notes) {
 /// The files to read, training first, each with the split it stands for.
 fn sources(path: &Path, notes: &mut Notes) -> Result<Vec<(Option<Split>, PathBuf)>> {
     if path.is_file() {
+        if let Some(error) = not_a_dataset::file(path) {
+            return Err(error);
+        }
         let split = match path.file_name().and_then(|name| name.to_str()) {
             Some("transforms_val.json") => Some(Split::Val),
             Some("transforms_test.json") => Some(Split::Test),
@@ -113,11 +117,9 @@ fn sources(path: &Path, notes: &mut Notes) -> Result<Vec<(Option<Split>, PathBuf
         };
         return Ok(vec![(split, path.to_owned())]);
     }
-    ensure!(
-        path.is_dir(),
-        "{} does not exist; expected a folder with a transforms.json, or a .json file",
-        path.display()
-    );
+    if !path.is_dir() {
+        return Err(not_a_dataset::nowhere(path));
+    }
     let present = |name: &str| Some(path.join(name)).filter(|path| path.is_file());
     let split_files: Vec<_> = [Split::Train, Split::Val, Split::Test]
         .into_iter()
@@ -137,22 +139,7 @@ fn sources(path: &Path, notes: &mut Notes) -> Result<Vec<(Option<Split>, PathBuf
             Ok(train.chain(split_files).collect())
         }
         (None, _) if !split_files.is_empty() => Ok(split_files),
-        (None, _) => bail!(
-            "expected transforms.json or transforms_train.json in {}, found {}",
-            path.display(),
-            json_files(path)
-        ),
-    }
-}
-
-fn json_files(folder: &Path) -> String {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let mut names: Vec<_> = names.filter(|name| name.ends_with(".json")).collect();
-    names.sort();
-    match names.len() {
-        0 => "no .json file; convert your photos with COLMAP and one of its exporters".into(),
-        _ => format!("{}; name the file itself", names.join(", ")),
+        (None, _) => Err(not_a_dataset::folder(path)),
     }
 }
 
