@@ -66,7 +66,11 @@ pub(super) fn run(args: &Info, session: &Session<'_>) -> Result<()> {
         write_atomically(path, |file| Ok(file.write_all(drawing.svg().as_bytes())?))?;
     }
     match report.problems.first().filter(|problem| problem.severity == Severity::Error) {
-        Some(problem) => Err(Failed(format!("training would fail: {}", problem.message)).into()),
+        Some(problem) if session.global.json => {
+            Err(Failed(format!("training would fail: {}", problem.message)).into())
+        }
+        // What was printed as text is not said again.
+        Some(_) => Err(Failed("training would fail, as the report tells".to_owned()).into()),
         None => Ok(()),
     }
 }

@@ -188,7 +188,11 @@ fn missing_images_are_told_and_fail_when_none_is_left() {
     assert_eq!([&result.json["frames"], &result.json["found"], &result.json["cameras"]], [24, 0, 1]);
     assert!(result.json["box"]["max"][2].is_number() && result.json["memory"]["device_bytes"].is_u64());
     assert!(result.stderr.contains("training would fail: 24 of 24 listed"), "{}", result.stderr);
-    nerf().arg("info").arg(toys.path()).assert().code(1).stdout(contains("training would fail; 1 error"));
+    let text = nerf().arg("info").arg(toys.path()).assert().code(1);
+    text.stdout(contains("training would fail; 1 error"))
+        .stderr("error: training would fail, as the report tells\n");
+    let unreadable = nerf().args(["info", "no/such/folder"]).assert().code(1);
+    unreadable.stdout("").stderr(contains("no/such/folder does not exist"));
 }
 
 #[test]
