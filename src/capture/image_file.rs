@@ -1,6 +1,7 @@
 //! Image files: every format that is read, PNG and OpenEXR as they are written.
 
 mod alpha;
+mod color_key;
 mod decode;
 mod depth;
 mod foreign;
@@ -22,6 +23,7 @@ use anyhow::{Context, Result, ensure};
 use crate::photo::{BitDepth, Image, Pixels};
 use crate::support::file::write_atomically;
 pub(crate) use alpha::{Evidence, Multiplied};
+pub(crate) use color_key::ColorKey;
 use decode::FileFormat;
 pub use depth::{DepthMap, load_depth};
 pub use foreign::Foreign;

@@ -3,6 +3,7 @@
 use super::intrinsics::Intrinsics;
 use super::notes::Notes;
 use crate::capture::diagnostics::Diagnostic;
+use crate::capture::image_file::ColorKey;
 use crate::photo::Split;
 use glam::{DAffine3, DVec3};
 
@@ -37,6 +38,8 @@ pub struct FrameEntry {
     pub mask_path: Option<String>,
     /// Its depth file.
     pub depth: Option<DepthEntry>,
+    /// The colours that are transparent.
+    pub(super) color_key: ColorKey,
 }
 
 impl Listing {

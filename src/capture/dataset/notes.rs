@@ -47,6 +47,11 @@ impl Notes {
         self.merge(Pending::new(Severity::Error, message.into()));
     }
 
+    /// A remark of any severity.
+    pub(crate) fn say(&mut self, severity: Severity, message: impl Into<String>) {
+        self.merge(Pending::new(severity, message.into()));
+    }
+
     /// A remark with something to do about it.
     pub(crate) fn advise(&mut self, severity: Severity, advised: Advised) {
         let message = advised.to_string();

@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 
 use super::sidecars::Sidecars;
 use super::{Dataset, Frame, prefetch};
-use crate::capture::image_file::{Multiplied, Turn, Window, crop, nearest, reduce_any};
+use crate::capture::image_file::{ColorKey, Multiplied, Turn, Window, crop, nearest, reduce_any};
 use crate::photo::{AlphaMode, Photo, Reading};
 use crate::photo::{BitDepth, Image};
 
@@ -18,6 +18,8 @@ pub(super) struct PhotoSource {
     /// The part of the turned image that is used.
     pub(super) window: Window,
     pub(super) sidecars: Sidecars,
+    /// The colours of the image that are transparent.
+    pub(super) color_key: ColorKey,
 }
 
 /// What all frames of a dataset are read alike by.
@@ -116,6 +118,7 @@ impl Frame {
             let alpha = Image::load(path)?;
             image = image.with_alpha(&nearest(&alpha.red(), alpha.size(), *stored));
         }
+        let image = image.keyed(self.source.color_key);
         Ok(match turn {
             Some(turn) => image.turned(*turn),
             None => image,

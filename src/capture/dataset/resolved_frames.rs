@@ -232,16 +232,17 @@ fn frame(
     for remark in remarks {
         notes.frame(remark.severity, &entry.label, remark.message);
     }
+    let is_keyed = entry.color_key.words().is_some() && header.bits != BitDepth::Float;
     Ok(Frame {
         name: entry.file_path.clone(),
         path,
         camera: camera.cropped(window.corner, window.size).resized(size[0], size[1]),
-        has_alpha: header.has_alpha || sidecars.alpha.is_some(),
+        has_alpha: header.has_alpha || sidecars.alpha.is_some() || is_keyed,
         has_own_alpha: header.has_alpha,
         bits: header.bits,
         has_mask: !sidecars.masks.is_empty(),
         has_depth: sidecars.depth.is_some(),
-        source: PhotoSource { stored, turn, window, sidecars },
+        source: PhotoSource { stored, turn, window, sidecars, color_key: entry.color_key },
     })
 }
 

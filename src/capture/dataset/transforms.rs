@@ -4,6 +4,7 @@ mod dialect;
 mod ngp_box;
 mod outline;
 mod split_lists;
+mod unheeded;
 
 use std::path::Path;
 
@@ -16,6 +17,7 @@ use super::listing::{FrameEntry, Listing, SceneBox};
 use super::notes::Notes;
 use super::pose::{self, Axes, handedness};
 use super::sidecars;
+use crate::capture::image_file::ColorKey;
 use outline::Section;
 
 /// Parses files of one dataset, whose poses follow one rule. Errors name the file, the frame and the key.
@@ -81,8 +83,10 @@ pub(super) fn parse_document(document: &Value) -> Result<Listing> {
         split_lists::assign(file, &mut entries, &mut notes)?;
         scene_box = scene_box.or(SceneBox::read(file, &mut notes)?);
     }
-    let first = sections.iter().find_map(|section| section.frames.first()?.1.as_object());
-    let dialect = dialect::name(around.first().copied(), first.map(Fields));
+    let frames = sections.iter().flat_map(|section| &section.frames);
+    let frames: Vec<Fields> = frames.filter_map(|(_, frame)| frame.as_object().map(Fields)).collect();
+    unheeded::tell(around.first().copied(), &frames, &mut notes);
+    let dialect = dialect::name(around.first().copied(), frames.first().copied());
     Ok(Listing { frames: entries, scene_box, point_cloud, dialect, notes })
 }
 
@@ -102,16 +106,23 @@ fn label(index: usize, key: Option<&str>, frame: &Value) -> String {
 struct File<'a> {
     section: &'a Section<'a>,
     axes: Axes,
+    color_key: ColorKey,
     intrinsics: Vec<Stated>,
 }
 
 impl<'a> File<'a> {
     fn read(section: &'a Section<'a>, notes: &mut Notes) -> Result<Self> {
-        let mut file = Self { section, axes: Axes::OpenGl, intrinsics: Vec::new() };
+        let color_key = ColorKey::default();
+        let mut file = Self { section, axes: Axes::OpenGl, color_key, intrinsics: Vec::new() };
         for &fields in &section.around {
             let axes = Axes::of(fields)?;
             file.axes = if file.axes == Axes::OpenGl { axes } else { file.axes };
             file.intrinsics.extend(stated(fields, "the file", notes)?);
+            file.color_key.white |= fields.flag("white_transparent")? == Some(true);
+            file.color_key.black |= fields.flag("black_transparent")? == Some(true);
+        }
+        if let Some(colors) = file.color_key.words() {
+            notes.note(format!("pixels of pure {colors} are transparent, as the file asks for"));
         }
         Ok(file)
     }
@@ -137,8 +148,16 @@ impl<'a> File<'a> {
         let Some(world_from_camera) = pose::read(fields, self.axes, label, notes)? else {
             return Ok(None);
         };
-        let (label, split) = (label.to_owned(), self.section.split);
-        Ok(Some(FrameEntry { label, intrinsics, world_from_camera, split, file_path, mask_path, depth }))
+        Ok(Some(FrameEntry {
+            label: label.to_owned(),
+            file_path,
+            intrinsics,
+            world_from_camera,
+            split: self.section.split,
+            mask_path,
+            depth,
+            color_key: self.color_key,
+        }))
     }
 }
 
@@ -287,6 +306,31 @@ pub(super) mod tests {
         assert_eq!(scene(json!({"aabb_scale": 1000})).expect("a box").aabb_scale, 128);
         let mitsuba = scene(json!({"aabb_scale": 1, "from_mitsuba": true})).expect("a box");
         assert_eq!((mitsuba.scale, mitsuba.offset.x), (0.66, 0.165));
+    }
+
+    #[test]
+    fn keys_of_others_are_told() {
+        let said = |frame: Value, file: Value| {
+            let mut file = file;
+            file["fl_x"] = json!(9);
+            messages(&one(frame, file))
+        };
+        let idle = json!({"sharpen": 0, "n_frames": 3, "orientation_override": "none", "envmap": null});
+        assert_eq!(said(json!({"time": 0.5, "rolling_shutter": [0, 0, 0]}), idle), "");
+        let all = said(
+            json!({"driver_parameters": {"LightX": 1}}),
+            json!({"sharpen": 0.5, "black_transparent": true}),
+        );
+        for expected in
+            ["`sharpen` is not heeded", "`driver_parameters` is not heeded", "pixels of pure black are"]
+        {
+            assert!(all.contains(expected), "{all}");
+        }
+        let mut moving = frames(&["a", "b", "c"]);
+        moving.iter_mut().enumerate().for_each(|(index, frame)| frame["time"] = json!(0.5 * index as f64));
+        let document = json!({"fl_x": 9, "n_frames": 2, "frames": moving}).to_string();
+        let moving = messages(&parse(&document).expect("valid"));
+        assert!(moving.contains("as if it stood still") && moving.contains("`n_frames`"), "{moving}");
     }
 
     /// The pose of one frame and what is said about it.
