@@ -59,5 +59,5 @@ fn masked_pixels_are_not_measured() {
     assert!(said.contains("0001 is not measured: its mask ignores every pixel"), "{said}");
 
     told(here, &["eval", "run", "toys", "--crop", "0,0,4,0", "--downscale", "2", "--save", "views"]);
-    assert_eq!(image::image_dimensions(here.join("views/0000.png")).expect("a PNG"), (10, 12));
+    assert_eq!(image::image_dimensions(here.join("views/test_0000.png")).expect("a PNG"), (10, 12));
 }

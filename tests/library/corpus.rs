@@ -71,7 +71,10 @@ const TABLE: &[Expected] = &[
     file("067", "nerfstudio", 20, 343.359550, Pinhole),
     file("073", "instant-ngp", 110, 798.387356, OpenCv),
     file("075", "instant-ngp", 36, 1607.462216, OpenCv),
-    file("077", "nerfstudio", 81, 584.108807, Pinhole),
+    Expected {
+        notes: &["`seg_file_path` is not heeded"],
+        ..file("077", "nerfstudio", 81, 584.108807, Pinhole)
+    },
     file("079", "instant-ngp", 29, 3359.669721, OpenCv),
     file("081", "instant-ngp", 46, 1364.391066, OpenCv),
     file("083", "blender", 100, 11683.657779, Pinhole),

@@ -324,7 +324,7 @@ fn what_is_no_file_is_refused() {
     assert!(message("photo.png").contains("expected an image file, found a folder"));
     assert!(message("nothing.png").contains("nothing.png: No such file"));
     std::fs::write(folder.path().join("empty.png"), "").expect("writable");
-    assert!(message("empty.png").contains("found 0 bytes"));
+    assert!(message("empty.png").contains("found an empty file"));
 }
 
 proptest! {

@@ -39,7 +39,13 @@ fn every_damaged_file_is_told() {
     let whole = fs::read(toys.photo(0)).expect("readable");
     fs::write(toys.photo(0), &whole[..whole.len() / 2]).expect("writable");
     let result = toys.info();
-    for name in ["0000.png", "0003.png", "0007.png", "m/5.png"] {
+    result.expect(
+        1,
+        "error",
+        &["2 of 24 photos cannot be read (./train/0003, ./train/0007): each is an empty file"],
+        &[],
+    );
+    for name in ["0000.png", "m/5.png"] {
         result.expect(1, "error", &[name], &[]);
     }
     result.expect(1, "warning", &["1 of 24 listed images", "0009"], &[]);
@@ -51,7 +57,7 @@ fn every_damaged_file_is_told() {
         }
     }
     let result = toys.info();
-    result.expect(1, "error", &["0004.png", "found 0 bytes"], &[]);
+    result.expect(1, "error", &["23 of 24 photos cannot be read", "each is an empty file"], &[]);
     assert_eq!([&result.json["frames"], &result.json["found"]], [24, 0]);
     assert!(!result.stderr.contains("put the images"), "{}", result.stderr);
 }
@@ -68,7 +74,8 @@ fn masks_that_belong_to_no_photo_are_told() {
     let masks = toys.path().join("masks");
     fs::create_dir(&masks).expect("writable");
     toys.info().expect_no_alarm();
-    let mask = image::GrayImage::from_pixel(64, 64, image::Luma([255]));
+    let mut mask = image::GrayImage::from_pixel(64, 64, image::Luma([255]));
+    mask.put_pixel(0, 0, image::Luma([0]));
     for name in ["mask_0000.png", "mask_0001.png"] {
         mask.save(masks.join(name)).expect("writable");
     }
