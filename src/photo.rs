@@ -9,9 +9,6 @@ pub use image::{BitDepth, Image, Pixels};
 pub use reading::{AlphaMode, Crop, Reading};
 pub use split::Split;
 
-use crate::support::format::count;
-use crate::support::remedy::{Advised, Remedy};
-
 /// One frame's pixels, at the size of its camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Photo {
@@ -44,16 +41,3 @@ impl From<Image> for Photo {
         Self { image, ignored: Vec::new(), depth: Vec::new(), far_depth: 0.0 }
     }
 }
-
-/// What keeps training from beginning where masks ignore all of its photos; `inverts` if masks were inverted.
-pub(crate) fn nothing_counts(photos: usize, inverts: bool) -> Advised {
-    let photos = count(photos, "training photo");
-    let found = format!("the masks ignore every pixel of all {photos}; they may be inverted: ");
-    let remedy = if inverts { Remedy::LeaveMasks } else { Remedy::InvertMasks };
-    Advised::new(found, remedy, "")
-}
-
-/// What keeps training with depth from beginning where no photo has any.
-pub(crate) const NO_DEPTH_KNOWN: &str = "no pixel of the training photos has a known depth: all values are 0, negative, not \
-                                         finite, the largest that their files can hold, or beyond the scene box by far; \
-                                         check their units";

@@ -1,5 +1,6 @@
 //! What is said about a dataset: how much it matters, what it is, and what to do.
 
+use crate::support::format::count;
 use crate::support::remedy::{Advised, Remedy};
 use serde::Serialize;
 use std::fmt;
@@ -74,6 +75,19 @@ impl From<Advised> for Diagnostic {
         Self::advise(Severity::Error, advised)
     }
 }
+
+/// What keeps training from beginning where masks ignore all of its photos; `inverts` if masks were inverted.
+pub(crate) fn nothing_counts(photos: usize, inverts: bool) -> Advised {
+    let photos = count(photos, "training photo");
+    let found = format!("the masks ignore every pixel of all {photos}; they may be inverted: ");
+    let remedy = if inverts { Remedy::LeaveMasks } else { Remedy::InvertMasks };
+    Advised::new(found, remedy, "")
+}
+
+/// What keeps training with depth from beginning where no photo has any.
+pub(crate) const NO_DEPTH_KNOWN: &str = "no pixel of the training photos has a known depth: all values are 0, negative, not \
+                                         finite, the largest that their files can hold, or beyond the scene box by far; \
+                                         check their units";
 
 #[cfg(test)]
 mod tests {

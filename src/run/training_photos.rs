@@ -4,12 +4,12 @@ use super::event::{DepthTold, Event, Observer, Warning};
 use super::memory::{MemoryUse, PhotoUse};
 use crate::camera::Camera;
 use crate::capture::dataset::Dataset;
+use crate::capture::diagnostics::{NO_DEPTH_KNOWN, nothing_counts};
 use crate::config::Config;
 use crate::field::trainer::Trainer;
 use crate::field::training_views::TrainingViews;
 use crate::field::{Field, Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
-use crate::photo::{NO_DEPTH_KNOWN, nothing_counts};
 use anyhow::{Result, ensure};
 use std::sync::Arc;
 

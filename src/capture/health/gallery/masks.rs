@@ -3,8 +3,8 @@
 use super::super::{Diagnostic, Spread};
 use super::{Gallery, Look};
 use crate::capture::dataset::Dataset;
-use crate::capture::diagnostics::Severity;
-use crate::photo::{Photo, nothing_counts};
+use crate::capture::diagnostics::{Severity, nothing_counts};
+use crate::photo::Photo;
 use crate::support::format::{count, percent};
 use crate::support::remedy::{Advised, Remedy};
 use std::collections::HashSet;
