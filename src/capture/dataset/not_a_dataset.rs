@@ -17,8 +17,8 @@ const LISTS: [&str; 4] =
 /// Files of a COLMAP model that alone tell it.
 const COLMAP: [&str; 2] = ["images.bin", "images.txt"];
 /// Where COLMAP models lie in a folder of a project.
-const COLMAP_FOLDERS: [&str; 7] =
-    [".", "sparse/0", "sparse", "colmap/sparse/0", "colmap/sparse", "colmap", "dense/sparse"];
+const COLMAP_FOLDERS: [&str; 8] =
+    [".", "0", "sparse/0", "sparse", "colmap/sparse/0", "colmap/sparse", "colmap", "dense/sparse"];
 /// Of an archive, so many bytes at its end are looked at for its names.
 const TABLE: u64 = 4 << 20;
 /// Most folders within or beside that are looked into.
@@ -181,9 +181,10 @@ pub(super) fn folder(path: &Path) -> Error {
     if !lists.is_empty() {
         return anyhow!("{expected}, found {}; name the file itself", few(&lists));
     }
-    if let Some(dataset) = around(path) {
+    let outer = outer(path);
+    if let Some(dataset) = outer.as_ref().filter(|outer| is_dataset(outer)) {
         let name = dataset.display();
-        return anyhow!("{expected}, found none there but in {name}; run `nerf train {}`", quoted(&dataset));
+        return anyhow!("{expected}, found none there but in {name}; run `nerf train {}`", quoted(dataset));
     }
     let has_model = |folder: &&&str| COLMAP.iter().any(|name| is_there(&format!("{folder}/{name}")));
     if let Some(model) = COLMAP_FOLDERS.iter().find(has_model) {
@@ -196,11 +197,12 @@ pub(super) fn folder(path: &Path) -> Error {
     if is_there("poses_bounds.npy") {
         return anyhow!("{expected}, found poses_bounds.npy, the poses of LLFF, which are not read; {LLFF}");
     }
-    contents(path, &names, &expected)
+    let beside = outer.and_then(|outer| only_dataset(&outer));
+    contents(path, &names, &expected, beside)
 }
 
-/// What to make of what is in a folder without any poses.
-fn contents(path: &Path, names: &[String], expected: &str) -> Error {
+/// What to make of what is in a folder without any poses; the dataset beside it may be of another scene.
+fn contents(path: &Path, names: &[String], expected: &str, beside: Option<PathBuf>) -> Error {
     let ends = |ends: &[&str]| {
         let is_so = |name: &&String| ends.iter().any(|end| name.to_lowercase().ends_with(end));
         names.iter().find(is_so).map(|name| path.join(name))
@@ -215,14 +217,24 @@ fn contents(path: &Path, names: &[String], expected: &str) -> Error {
     if let Some((folder, number)) =
         folders.map(|folder| (folder.clone(), pictures(&folder))).find(|(_, number)| *number > 0)
     {
+        let theirs =
+            beside.map(|dataset| format!("; if {} lists them, run `nerf train {0}`", quoted(&dataset)));
         let text = format!("{expected}, found {} and no poses: ", count(number, "picture"));
-        return Advised::new(text, Remedy::FindPoses { photos: quoted(&folder) }, "").into();
+        let remedy = Remedy::FindPoses { photos: quoted(&folder) };
+        return Advised::new(text, remedy, theirs.unwrap_or_default()).into();
     }
     if let Some(video) = ends(&[".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v"]) {
         let text = format!("{expected}, found a video: ");
         return Advised::new(text, Remedy::FindPosesOfVideo { video: quoted(&video) }, "").into();
     }
     let found = if names.is_empty() { "an empty folder".to_owned() } else { few(names) };
+    if let Some(dataset) = beside {
+        let command = quoted(&dataset);
+        return anyhow!(
+            "{expected}, found {found}; if {} beside it is meant, run `nerf train {command}`",
+            dataset.display()
+        );
+    }
     anyhow!(
         "{expected}, found {found} and no .json file; convert your photos with COLMAP and one of its exporters"
     )
@@ -238,17 +250,21 @@ fn is_dataset(folder: &Path) -> bool {
     LISTS.iter().any(|list| folder.join(list).is_file())
 }
 
-/// The dataset that a folder is in, or the only one beside it.
-fn around(path: &Path) -> Option<PathBuf> {
+/// The folder that a folder is in.
+fn outer(path: &Path) -> Option<PathBuf> {
     let is_named =
         path.file_name().is_some() && path.parent().is_some_and(|outer| !outer.as_os_str().is_empty());
-    let outer =
-        if is_named { path.parent()?.to_owned() } else { path.canonicalize().ok()?.parent()?.to_owned() };
-    if is_dataset(&outer) {
-        return Some(outer);
+    if is_named {
+        Some(path.parent()?.to_owned())
+    } else {
+        Some(path.canonicalize().ok()?.parent()?.to_owned())
     }
-    let beside = datasets(&outer, &names(&outer));
-    beside.first().filter(|_| beside.len() == 1).cloned()
+}
+
+/// The dataset in a folder, where there is one alone.
+fn only_dataset(folder: &Path) -> Option<PathBuf> {
+    let found = datasets(folder, &names(folder));
+    found.first().filter(|_| found.len() == 1).cloned()
 }
 
 /// The names in a folder that are not hidden, in natural order.
@@ -299,8 +315,16 @@ mod tests {
             (
                 &[("lego/transforms.json", b"{}"), ("photos/x.txt", b"")],
                 "a/photos",
-                "a/lego; run `nerf train",
+                "a/lego beside it is meant, run `nerf train",
             ),
+            (
+                &[("fox/transforms.json", b"{}"), ("mine/1.jpg", b"")],
+                "a/mine",
+                "found 1 picture and no poses",
+            ),
+            (&[("fox/transforms.json", b"{}"), ("mine/1.jpg", b"")], "a/mine", "a/fox lists them, run"),
+            (&[("fox/transforms.json", b"{}"), ("m/0/images.bin", b"")], "a/m", "found a COLMAP model"),
+            (&[("fox/transforms.json", b"{}"), ("m/x.tar", &[0; 600])], "a/m", "x.tar is nothing but zeros"),
             (&[("poses.json", b"{}")], "a", "found poses.json; name the file itself"),
             (&[("checkpoint.safetensors", b"")], "a", "the folder of a training run"),
             (&[("sparse/0/images.bin", b"")], "a", "a/sparse/0 to a transforms.json"),
