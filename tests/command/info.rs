@@ -173,6 +173,9 @@ fn missing_images_are_told_and_fail_when_none_is_left() {
     let result = toys.info();
     result.expect(0, "warning", &["1 of 24 listed images", "train/0000"], &[]);
     assert_eq!([&result.json["frames"], &result.json["found"]], [24, 23]);
+    fs::write(toys.photo(1), "").expect("writable");
+    let text = nerf().arg("info").arg(toys.path()).assert().code(1);
+    text.stdout(contains("24 listed, 22 usable, 2 missing or unreadable"));
     for split in ["train", "val", "test"] {
         for entry in fs::read_dir(toys.path().join(split)).expect("readable") {
             fs::remove_file(entry.expect("readable").path()).expect("there");
@@ -202,7 +205,12 @@ fn bad_photos_are_named() {
     toys.edit_photo(10, |photo| photo.brighten(-400));
     toys.edit_photo(14, |photo| photo.adjust_contrast(-100.0).brighten(500));
     let result = toys.info();
-    result.expect(0, "warning", &["1 photo is blurred", "drop or retake"], &["./train/0006"]);
+    result.expect(
+        0,
+        "warning",
+        &["1 photo has far less fine detail", "drop or retake what is blurred"],
+        &["./train/0006"],
+    );
     result.expect(0, "warning", &["1 photo shows nothing but black"], &["./train/0010"]);
     result.expect(0, "warning", &["1 photo shows nothing but white"], &["./train/0014"]);
     assert!(info(&toys.path(), &["--no-photos"]).of_severity("warning").is_empty());

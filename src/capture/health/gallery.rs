@@ -200,9 +200,10 @@ impl Gallery {
         let frames: Vec<usize> = parts.iter().map(|(frame, _)| *frame).collect();
         Some(
             Diagnostic::warning(format!(
-                "{} blurred, at worst with {:.0} % of the fine detail of the frames around it ({}): {}; drop or retake \
-                 them, a few blurred photos blur the whole field",
-                is_or_are(frames.len()),
+                "{} {} far less fine detail than the frames around, at worst {:.0} % of it ({}): {}; drop or retake \
+                 what is blurred, a few blurred photos blur the whole field; what shows a plain surface is right",
+                count(frames.len(), "photo"),
+                if frames.len() == 1 { "has" } else { "have" },
                 100.0 * worst.1,
                 dataset.frames[worst.0].name,
                 names(dataset, &frames)
@@ -264,8 +265,4 @@ impl Gallery {
             .about(frames),
         )
     }
-}
-
-fn is_or_are(number: usize) -> String {
-    format!("{} {}", count(number, "photo"), if number == 1 { "is" } else { "are" })
 }
