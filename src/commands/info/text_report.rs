@@ -51,9 +51,15 @@ impl Preflight<'_> {
 
     fn about_frames(&self) -> Vec<String> {
         let dataset = self.dataset;
-        let mut listed = format!("{} listed, {} found", dataset.listed, problems::found(dataset));
+        // Of the listed frames; damage may also be that of masks.
+        let [there, lost] = if dataset.damaged.is_empty() {
+            ["found", "missing"]
+        } else {
+            ["usable", "missing or unreadable"]
+        };
+        let mut listed = format!("{} listed, {} {there}", dataset.listed, problems::found(dataset));
         if !dataset.missing.is_empty() {
-            listed += &format!(", {} missing", dataset.missing.len());
+            listed += &format!(", {} {lost}", dataset.missing.len());
         }
         let same = !dataset.val.is_empty() && dataset.val == dataset.test;
         vec![format!(
