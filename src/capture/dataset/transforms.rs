@@ -318,14 +318,13 @@ pub(super) mod tests {
         let idle = json!({"sharpen": 0, "n_frames": 3, "orientation_override": "none", "envmap": null});
         assert_eq!(said(json!({"time": 0.5, "rolling_shutter": [0, 0, 0]}), idle), "");
         let all = said(
-            json!({"driver_parameters": {"LightX": 1}}),
+            json!({"driver_parameters": {"LightX": 1}, "fisheye_crop_radius": 9}),
             json!({"sharpen": 0.5, "black_transparent": true}),
         );
-        for expected in
-            ["`sharpen` is not heeded", "`driver_parameters` is not heeded", "pixels of pure black are"]
-        {
-            assert!(all.contains(expected), "{all}");
+        for key in ["sharpen", "driver_parameters", "fisheye_crop_radius"] {
+            assert!(all.contains(&format!("`{key}` is not heeded")), "{all}");
         }
+        assert!(all.contains("pixels of pure black are"), "{all}");
         let mut moving = frames(&["a", "b", "c"]);
         moving.iter_mut().enumerate().for_each(|(index, frame)| frame["time"] = json!(0.5 * index as f64));
         let document = json!({"fl_x": 9, "n_frames": 2, "frames": moving}).to_string();

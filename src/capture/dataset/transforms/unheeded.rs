@@ -7,7 +7,7 @@ use crate::capture::dataset::notes::Notes;
 use crate::capture::diagnostics::Severity::{self, Note, Warning};
 
 /// Keys, whether they stand in the file or in frames, how much it matters, who does what by them, and what is done here.
-const KEYS: [(&str, Severity, &str, &str); 24] = [
+const KEYS: [(&str, Severity, &str, &str); 25] = [
     ("sharpen", Note, "instant-ngp sharpens the photos by it", "photos are used as they are"),
     (
         "sharpness_discard_threshold",
@@ -67,6 +67,12 @@ const KEYS: [(&str, Severity, &str, &str); 24] = [
         "the box follows from the cameras",
     ),
     ("worldtogt", Note, "SDFStudio turns meshes back by it", "results are in the world of the poses"),
+    (
+        "fisheye_crop_radius",
+        Note,
+        "nerfstudio leaves out what is farther from the middle of fisheye pictures",
+        "all pixels count; `mask_path` leaves some out",
+    ),
     ("semantics", Note, "nerfstudio learns classes from it", "no classes are learnt"),
     ("semantic_path", Note, "nerfstudio learns classes from those files", "no classes are learnt"),
     ("seg_file_path", Note, "semantic methods learn classes from those files", "no classes are learnt"),
