@@ -105,7 +105,7 @@ pub(super) fn remedy(nowhere: &[&Sought], search: &mut Search) -> String {
     let root = search.root;
     match search.folders.pictures(root) {
         Some((folder, names)) => format!(
-            "found {} in {}, such as {}, which no `file_path` is like; correct `file_path`",
+            "found {} in {}, such as {}, where no `file_path` leads; correct `file_path`",
             count(names.len(), "picture"),
             folder.display(),
             few(&names[..1])

@@ -107,7 +107,8 @@ pub(super) fn examine(scene: &CameraSet<'_>, directions: &ViewDirections) -> Opt
          room or surroundings from within, a panorama), the poses are right, and that would spoil them",
         convention.name,
         percent(agreement.seeing),
-        point(agreement.focus, scene.extent()),
+        // Poses read wrongly may all be in one place.
+        point(agreement.focus, scene.extent().max(agreement.focus.length())),
         percent(agreement.miss),
         convention.remedy,
     );
