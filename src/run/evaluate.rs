@@ -1,6 +1,6 @@
 //! Test views rendered and compared with their photos.
 
-use super::border::BorderWeight;
+use super::border::{self, BorderWeight};
 use super::depths::{Depths, Onlookers, median_depth};
 use super::event::{Event, Observer, Warning};
 use super::scores::{Means, Score, Scores};
@@ -132,9 +132,13 @@ impl<'a> Evaluator<'a> {
     /// # Errors
     /// When the device was lost, or its interrupt was raised.
     pub fn share_at_border(&mut self, bounds: &Bounds) -> Result<f64> {
+        let frames = evenly_spaced(&self.dataset.train, BORDER_VIEWS);
+        let cameras: Vec<_> = frames.iter().map(|&index| &self.dataset.frames[index].camera).collect();
         let mut weight = BorderWeight::default();
-        for index in evenly_spaced(&self.dataset.train, BORDER_VIEWS) {
-            let camera = &self.dataset.frames[index].camera;
+        if border::is_far(bounds, &cameras) {
+            return Ok(weight.share());
+        }
+        for camera in cameras {
             let reduced = |side: u32| side.div_ceil(camera.width.max(camera.height).div_ceil(BORDER_SIDE));
             let camera = camera.resized(reduced(camera.width), reduced(camera.height));
             weight.add(&self.renderer.render(&camera)?, &camera, bounds);
