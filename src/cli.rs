@@ -23,9 +23,10 @@ Exit codes:
   0    Done
   1    Failed for good: bad data, or it does not fit
   2    Usage
-  3    Failed, and may work when it is tried again: disk full or failing, device lost, busy or out of memory, too many open
-       files, folder in use by another process
-  129  Interrupted by SIGHUP, 130 by SIGINT (Ctrl-C), 143 by SIGTERM; a training is saved first, unless a second signal comes";
+  3    Failed, and may work when it is tried again: disk full or failing, device lost, busy
+       or out of memory, too many open files, folder in use by another process
+  129  Interrupted by SIGHUP, 130 by SIGINT (Ctrl-C), 143 by SIGTERM; a training is saved
+       first, unless a second signal comes";
 
 /// Train neural radiance fields from posed photos and render new views of them.
 ///
@@ -64,6 +65,7 @@ pub(crate) struct Global {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Train a field on a dataset
+    #[command(after_help = EXIT_CODES)]
     Train(Box<Train>),
     /// Render views of a trained field
     Render(Render),

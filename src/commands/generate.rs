@@ -15,13 +15,14 @@ pub(super) fn run(args: &Generate, session: &Session<'_>) -> Result<()> {
     let name = args.scene.as_deref().context("the name of a scene is needed; see --list")?;
     let out = args.out.as_deref().context("--out DIR is needed")?;
     let options = scene::SceneOptions {
+        scene: name.to_owned(),
         views: ViewCounts::of_total(args.views).context("--views")?,
         size: args.size,
         hdr: args.hdr,
         lenses: args.lens.clone(),
         samples: args.samples,
         seed: args.seed,
-        ..scene::SceneOptions::new(name)
+        interrupt: session.signals.interrupt.clone(),
     };
     let progress = Progress::new(session.console, "generating");
     let total = options.views.total();

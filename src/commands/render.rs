@@ -61,6 +61,15 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
             "the file system of {out} has no locks: let only one process at a time render to it"
         ));
     }
+    let is_ours = |index| kept.contains(&index) || jobs.iter().any(|job| job.index as u64 == index);
+    let strangers = if args.overwrite { folder.strangers(is_ours) } else { 0 };
+    if strangers > 0 {
+        session.console.warn(&format!(
+            "{} in {}, named like frames, are not of this rendering and stay there; remove them, or render to another folder",
+            count(strangers, "picture"),
+            args.out.display()
+        ));
+    }
     let all = jobs.len();
     jobs.retain(|job| args.overwrite || !kept.contains(&(job.index as u64)));
     let mut seconds = Vec::new();

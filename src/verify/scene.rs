@@ -17,6 +17,7 @@ mod world;
 
 use crate::camera::LensKind;
 use crate::photo::color_space::srgb_from_linear;
+use crate::support::interrupt::Interrupt;
 use anyhow::{Result, bail};
 use fog::Fog;
 use glam::{DVec3, dvec3};
@@ -185,6 +186,8 @@ pub struct SceneOptions {
     pub samples: u32,
     /// Varies the camera positions.
     pub seed: u64,
+    /// Asked before each view; where it was raised, nothing stays of the dataset.
+    pub interrupt: Interrupt,
 }
 
 impl SceneOptions {
@@ -192,7 +195,8 @@ impl SceneOptions {
     pub fn new(scene: &str) -> Self {
         let views = ViewCounts { train: 82, val: 6, test: 12 };
         let (scene, lenses) = (scene.to_owned(), vec![LensKind::Pinhole]);
-        Self { scene, views, size: (200, 200), hdr: false, lenses, samples: 4, seed: 0 }
+        let interrupt = Interrupt::default();
+        Self { scene, views, size: (200, 200), hdr: false, lenses, samples: 4, seed: 0, interrupt }
     }
 
     fn check(&self) -> Result<()> {
@@ -230,7 +234,8 @@ pub struct Summary {
 /// `progress` is called after each view, from any thread, with the number of views done so far.
 ///
 /// # Errors
-/// If the options do not fit the scene, the folder is in use, or a file cannot be written.
+/// If the options do not fit the scene, the folder is in use, a file cannot be written, or the interrupt was raised. Of a
+/// dataset that was begun nothing stays then.
 pub fn generate(options: &SceneOptions, out: &Path, progress: &(dyn Fn(usize) + Sync)) -> Result<Summary> {
     let scene = Scene::named(&options.scene)?;
     options.check()?;

@@ -284,3 +284,13 @@ fn mistakes_are_explained() {
     assert!(ViewCounts::of_total(2).is_err());
     assert_eq!(ViewCounts::of_total(100).expect("enough"), ViewCounts { train: 82, val: 6, test: 12 });
 }
+
+#[test]
+fn nothing_stays_of_what_was_interrupted() {
+    let place = tempfile::tempdir().expect("temporary folder");
+    let (options, out) = (small("toys"), place.path().join("toys"));
+    let stop = |_: usize| options.interrupt.raise();
+    let error = generate(&options, &out, &stop).expect_err("interrupted after the first view");
+    assert!(nerf::support::interrupt::Interrupted::is_cause_of(&error), "{error:#}");
+    assert!(!out.exists(), "the next attempt finds no folder in use");
+}

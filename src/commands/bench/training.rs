@@ -64,6 +64,7 @@ pub(super) fn run(args: &Training, session: &Session<'_>) -> Result<()> {
     ensure!(!dataset.test.is_empty(), "the dataset has no test views to measure; a benchmark needs some");
     let gpu = session.open_gpu()?;
     let planned = plan(args, &dataset, &gpu)?;
+    session.end_gracefully()?;
     let _lock = FolderLock::alone(&args.out)?;
     let benchmark = Benchmark { gpu, dataset: &dataset, views: args.views as usize };
     let about = joined(
@@ -149,7 +150,7 @@ impl Benchmark<'_> {
         let compile_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let stepper = Stepper::new(trainer, StepClock::new(&resolved.metadata, 0.0));
-        let curve = follow(stepper, &mut evaluator, &resolved.test, session.console)?;
+        let curve = follow(stepper, &mut evaluator, &resolved.test, session)?;
         let settings = resolved.metadata.config.clone();
         Ok(MeasuredRun {
             config: planned.config.clone(),

@@ -79,6 +79,12 @@ impl FrameFolder {
         !self.lock.is_effective()
     }
 
+    /// Pictures in the folder of no frame for which `is_ours`.
+    pub(super) fn strangers(&self, is_ours: impl Fn(u64) -> bool) -> usize {
+        let index = |path: &PathBuf| path.file_stem()?.to_str()?.split('_').next()?.parse().ok();
+        self.pictures().iter().filter(|path| !index(path).is_some_and(&is_ours)).count()
+    }
+
     /// Adds a frame whose files are whole.
     pub(super) fn add(&mut self, index: usize, mut frame: Value) -> Result<()> {
         frame["bytes"] = self.bytes(&frame).context("a frame's files have vanished")?.into();
@@ -114,7 +120,9 @@ impl FrameFolder {
         let show = self.path.display();
         let listing = match read(&self.path) {
             Err(_) if earlier == Earlier::Replaced => None,
-            listing => listing?,
+            listing => listing.with_context(|| {
+                format!("what is in {show} cannot be told; name another folder, or add --overwrite to replace the frames in it")
+            })?,
         };
         let whole = |mut frames: Frames| {
             frames.retain(|_, frame| self.bytes(frame).is_some_and(|bytes| frame["bytes"] == bytes));
@@ -286,7 +294,13 @@ mod tests {
         let again = || rendering("f", "black");
         assert!(complaint(place.path(), again(), Earlier::Refused).contains("is not empty"));
         assert!(complaint(place.path(), again(), Earlier::Kept).contains("no frames.json"));
-        let (_, kept) = FrameFolder::take(place.path(), again(), Earlier::Replaced).expect("as asked");
+        fs::write(place.path().join("0007_depth.png"), "a photo").expect("writable");
+        let (folder, kept) = FrameFolder::take(place.path(), again(), Earlier::Replaced).expect("as asked");
+        assert_eq!([0, 1, 8].map(|ours| folder.strangers(|index| index < ours)), [2, 1, 0]);
         assert!(kept.is_empty() && photo.exists());
+        drop(folder);
+        fs::write(place.path().join(LISTING), "{").expect("writable");
+        let broken = complaint(place.path(), again(), Earlier::Kept);
+        assert!(broken.contains("add --overwrite"), "{broken}");
     }
 }

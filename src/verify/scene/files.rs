@@ -28,17 +28,12 @@ pub(super) fn write(
         .flat_map(|split| (0..view_count(options, split)).map(move |index| (split, index)))
         .map(|(split, index)| GeneratedView { split, index, camera: camera(scene, options, split, index) })
         .collect();
-    for split in SPLITS {
-        let folder = out.join(split.name());
-        fs::create_dir_all(&folder).with_context(|| format!("creating {}", folder.display()))?;
+    let written = write_views(scene, options, &views, out, progress);
+    if written.is_err() {
+        // The folder was empty. What cannot be removed does no harm: there is no list of it.
+        SPLITS.iter().for_each(|split| drop(fs::remove_dir_all(out.join(split.name()))));
     }
-    let done = AtomicUsize::new(0);
-    views.par_iter().try_for_each(|view| {
-        let picture = render(scene, &view.camera, options.samples);
-        view.write(&picture, options.hdr, out)?;
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-        anyhow::Ok(())
-    })?;
+    written?;
     for split in SPLITS {
         let frames = views.iter().filter(|view| view.split == split);
         let listing = listing(scene, options, frames);
@@ -46,6 +41,28 @@ pub(super) fn write(
     }
     let files = 2 * views.len() + SPLITS.len();
     Ok(Summary { scene: scene.info().name, views: views.len(), files })
+}
+
+/// Writes the pictures.
+fn write_views(
+    scene: &Scene,
+    options: &SceneOptions,
+    views: &[GeneratedView],
+    out: &Path,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<()> {
+    for split in SPLITS {
+        let folder = out.join(split.name());
+        fs::create_dir_all(&folder).with_context(|| format!("creating {}", folder.display()))?;
+    }
+    let done = AtomicUsize::new(0);
+    views.par_iter().try_for_each(|view| {
+        options.interrupt.check()?;
+        let picture = render(scene, &view.camera, options.samples);
+        view.write(&picture, options.hdr, out)?;
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+        anyhow::Ok(())
+    })
 }
 
 /// Creates the folder `out`, or accepts it where it is empty; nobody else writes to it meanwhile.

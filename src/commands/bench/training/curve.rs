@@ -1,6 +1,6 @@
 //! One run, measured at times that are evenly spaced on a logarithmic axis.
 
-use crate::console::Console;
+use crate::commands::Session;
 use crate::narrator::Narrator;
 use crate::progress::{Progress, duration};
 use anyhow::{Context, Result};
@@ -75,13 +75,14 @@ pub(super) fn follow(
     mut stepper: Stepper,
     evaluator: &mut Evaluator<'_>,
     test: &[usize],
-    console: Console,
+    session: &Session<'_>,
 ) -> Result<Curve> {
-    let progress = Progress::new(console, "training");
+    let progress = Progress::new(session.console, "training");
     let (mut points, mut samples) = (Vec::<Point>::new(), 0);
     let (mut next_mark, mut next_loss) = (FIRST, 0.0);
     let mut loss = None;
     while !stepper.is_over() {
+        session.check_interrupt()?;
         let stats = stepper.block(Budget { steps: None, seconds: Some(next_mark) })?.stats;
         let (step, seconds) = (stepper.steps(), stepper.seconds());
         (loss, samples) = (Some(stats.loss), samples + stats.samples);
@@ -105,7 +106,8 @@ pub(super) fn follow(
     }
     drop(progress);
     let (step, seconds) = (stepper.steps(), stepper.seconds());
-    let scores = evaluator.all(test, &mut Narrator::new(console))?.context("there are no test views")?;
+    let scores =
+        evaluator.all(test, &mut Narrator::new(session.console))?.context("there are no test views")?;
     points.pop_if(|last| last.step == step);
     // The few once more, for the curve, and all of them.
     let few = scores.few.filter(|few| few.views < scores.all.views);
