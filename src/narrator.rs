@@ -78,13 +78,18 @@ impl Narrator {
         let Metadata { config, budget, bounds, splits, step, .. } = metadata;
         let train = count(splits.train.len(), "view");
         self.console.say(&format!("{train} to train on, {test_views} to measure on"));
-        self.console.detail(&format!(
+        let scene_box = format!(
             "scene box: centre {:.4}, half side {:.4}, {}; {}",
             bounds.center,
             bounds.half,
             count(bounds.cascades as usize, "cascade"),
             bounds.source
-        ));
+        );
+        if bounds.is_guess {
+            self.console.say(&format!("{scene_box}; `nerf info` tells what it needs to know better"));
+        } else {
+            self.console.detail(&scene_box);
+        }
         let steps = budget.steps.map(|steps| count(steps as usize, "step"));
         let ends: Vec<_> = steps.into_iter().chain(budget.seconds.map(duration)).collect();
         let from = if *step > 0 { format!(", from step {step} on") } else { String::new() };

@@ -103,12 +103,14 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// True, false, or a number that is 0 or not.
+    /// True, false, one of these as text, or a number that is 0 or not.
     pub(super) fn flag(self, key: &str) -> Result<Option<bool>> {
         match self.get(key) {
             None => Ok(None),
             Some(Value::Bool(flag)) => Ok(Some(*flag)),
             Some(Value::Number(number)) => Ok(Some(number.as_f64() != Some(0.0))),
+            Some(Value::String(text)) if text.eq_ignore_ascii_case("true") => Ok(Some(true)),
+            Some(Value::String(text)) if text.eq_ignore_ascii_case("false") => Ok(Some(false)),
             Some(other) => bail!("`{key}` must be true or false, found {}; {REMEDY}", describe(other)),
         }
     }

@@ -319,7 +319,7 @@ pub(super) mod tests {
         assert_eq!(said(json!({"time": 0.5, "rolling_shutter": [0, 0, 0]}), idle), "");
         let all = said(
             json!({"driver_parameters": {"LightX": 1}, "fisheye_crop_radius": 9}),
-            json!({"sharpen": 0.5, "black_transparent": true}),
+            json!({"sharpen": 0.5, "black_transparent": "True"}),
         );
         for key in ["sharpen", "driver_parameters", "fisheye_crop_radius"] {
             assert!(all.contains(&format!("`{key}` is not heeded")), "{all}");
