@@ -17,7 +17,7 @@ use nerf::field::renderer::{Renderer, View};
 use nerf::photo::color_space::{ColorSpace, depth_srgb8, opaque_srgb8};
 use nerf::run::TrainedField;
 use nerf::support::file::{available_bytes, first_within};
-use nerf::support::format::{bytes, count};
+use nerf::support::format::{bytes, count, plural};
 use serde_json::{Map, Value, json};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::panic::resume_unwind;
@@ -65,9 +65,11 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     let strangers = if args.overwrite { folder.strangers(is_ours) } else { 0 };
     if strangers > 0 {
         session.console.warn(&format!(
-            "{} in {}, named like frames, are not of this rendering and stay there; remove them, or render to another folder",
+            "{} in {} {} named like frames but not of this rendering; remove what does not belong there, or render to \
+             another folder",
             count(strangers, "picture"),
-            args.out.display()
+            args.out.display(),
+            plural(strangers as u64, "is", "are")
         ));
     }
     let all = jobs.len();
