@@ -38,6 +38,7 @@ use crate::capture::diagnostics::Diagnostic;
 use crate::capture::focus;
 use crate::photo::{BitDepth, Reading, Split};
 pub use camera_list::{UsualView, read_cameras};
+pub use file_names::{is_picture, with_extensions};
 pub use intrinsics::Intrinsics;
 pub use listing::{DepthEntry, DepthScale, FrameEntry, Listing, SceneBox};
 pub use splits::{HoldOut, evenly_spaced, spread_order};

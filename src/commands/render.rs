@@ -11,7 +11,7 @@ use frame_folder::{Earlier, FrameFolder};
 use framing::{framed, samples};
 use nerf::camera::orbit::Orbit;
 use nerf::camera::{Bounds, Camera, LensKind};
-use nerf::capture::dataset::{UsualView, read_cameras};
+use nerf::capture::dataset::{UsualView, read_cameras, with_extensions};
 use nerf::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
 use nerf::field::renderer::{Renderer, View};
 use nerf::photo::color_space::{ColorSpace, depth_srgb8, opaque_srgb8};
@@ -21,7 +21,7 @@ use nerf::support::format::{bytes, count, plural};
 use serde_json::{Map, Value, json};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::panic::resume_unwind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
 use std::time::Instant;
@@ -245,10 +245,7 @@ fn select(args: &Render, jobs: &mut Vec<Job>) -> Result<()> {
 fn apart_from_photos(args: &Render, jobs: &[Job]) -> Result<()> {
     let Some(file) = &args.path.cameras else { return Ok(()) };
     let folder = file.parent().unwrap_or(Path::new(""));
-    let photos = jobs.iter().flat_map(|job| {
-        let photo = folder.join(&job.source);
-        ["", ".png", ".jpg", ".jpeg", ".exr"].map(|end| PathBuf::from(format!("{}{end}", photo.display())))
-    });
+    let photos = jobs.iter().flat_map(|job| with_extensions(&folder.join(&job.source)));
     let found = first_within(&args.out, photos);
     ensure!(
         found.is_none(),

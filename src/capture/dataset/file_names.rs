@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use unicode_normalization::UnicodeNormalization;
 
 /// Extensions that a listed name may lack or have in place of another, the most common first.
-pub(super) const EXTENSIONS: [&str; 14] =
+const EXTENSIONS: [&str; 14] =
     ["png", "jpg", "jpeg", "exr", "webp", "tif", "tiff", "bmp", "hdr", "tga", "ppm", "pgm", "pnm", "jpe"];
 
 /// Extensions of pictures that are not read, which a listed name may have in place of one that is.
@@ -63,11 +63,15 @@ fn stem(name: &str) -> &str {
     }
 }
 
+/// Every extension that a name may lack, the most common first.
+pub(super) fn extensions() -> impl Iterator<Item = String> {
+    EXTENSIONS.map(str::to_owned).into_iter().chain(EXTENSIONS.map(str::to_uppercase))
+}
+
 /// The path itself, then with every extension that it may lack.
-pub(super) fn with_extensions(path: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+pub fn with_extensions(path: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     let base = path.as_os_str().to_owned();
-    let extensions = EXTENSIONS.map(str::to_owned).into_iter().chain(EXTENSIONS.map(str::to_uppercase));
-    let extended = extensions.map(move |extension| {
+    let extended = extensions().map(move |extension| {
         let mut name = base.clone();
         name.push(".");
         name.push(extension);
@@ -77,7 +81,8 @@ pub(super) fn with_extensions(path: &Path) -> impl Iterator<Item = PathBuf> + us
 }
 
 /// Whether a name has the extension of a picture.
-pub(super) fn is_picture(name: &str) -> bool {
+#[must_use]
+pub fn is_picture(name: &str) -> bool {
     let lower = name.to_lowercase();
     stem(&lower).len() < lower.len() && !name.starts_with('.') && !lower.ends_with(".npy")
 }

@@ -6,7 +6,7 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use super::file_names::{EXTENSIONS, Likeness, is_picture, natural_order};
+use super::file_names::{Likeness, extensions, is_picture, natural_order};
 
 /// More folders of like names than this are not looked into for one path.
 const MOST_FOLDERS: usize = 16;
@@ -92,9 +92,7 @@ impl Folders {
             None => (folder.to_owned(), name),
         };
         let names = self.folder(&inner);
-        let lower = EXTENSIONS.map(str::to_owned).into_iter();
-        let both = lower.chain(EXTENSIONS.map(str::to_uppercase));
-        let there = both.map(|end| format!("{name}.{end}"));
+        let there = extensions().map(|end| format!("{name}.{end}"));
         let there = there.filter(|name| names.names.contains(OsStr::new(name)));
         there.map(|name| inner.join(name)).filter(|path| path.is_file()).collect()
     }

@@ -1,14 +1,11 @@
 //! Where renderings of photos are saved: beside no input of the dataset, under names that tell the photo.
 
 use anyhow::{Result, ensure};
-use nerf::capture::dataset::Dataset;
+use nerf::capture::dataset::{Dataset, is_picture};
 use nerf::support::file::first_within;
 use std::collections::HashSet;
 use std::fs::canonicalize;
 use std::path::{Component, Path, PathBuf};
-
-/// The endings of image files. Other names may have full stops, too.
-const ENDINGS: [&str; 10] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "exr", "hdr", "tga"];
 
 /// The files in `folder`, which is there, to save the frames of `indices` to.
 pub(super) fn paths(folder: &Path, dataset: &Dataset, indices: &[usize]) -> Result<Vec<PathBuf>> {
@@ -40,10 +37,8 @@ fn names<'a>(photos: impl Iterator<Item = &'a str>) -> Vec<String> {
     let name = |(number, photo): (usize, &str)| {
         let path = Path::new(photo);
         let numbered = format!("{}_{number}", flat(path));
-        let is_image = path
-            .extension()
-            .and_then(|end| end.to_str())
-            .is_some_and(|end| ENDINGS.contains(&end.to_lowercase().as_str()));
+        // Other names may have full stops, too.
+        let is_image = path.file_name().and_then(|name| name.to_str()).is_some_and(is_picture);
         let bare = if is_image { path.with_extension("") } else { path.to_owned() };
         let candidates = [flat(&bare), flat(path), numbered];
         // Some file systems take upper and lower case for the same.
