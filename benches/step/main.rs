@@ -5,16 +5,18 @@
 //! cargo bench --bench step -- --config full --seconds 30
 //! ```
 //!
-//! Three measurements: the start, in a process of its own with the driver's cache off; the throughput, as
-//! `nerf train` trains; and the time of each stage, with a wait after each step, its arithmetic and traffic, and their
+//! Four measurements: the start, in a process of its own with the driver's cache off; the throughput, as
+//! `nerf train` trains; views of the field that this trained; and the time of each stage, with a wait after each step, its arithmetic and traffic, and their
 //! share of what the adapter can do (`cargo bench --bench ceilings`).
 
 mod report;
 mod stages;
+mod views;
 mod work;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Parser, ValueEnum};
+use nerf::camera::Camera;
 use nerf::capture::dataset::{Dataset, OpenOptions};
 use nerf::config::Config;
 use nerf::field::trainer::{StepStats, Trainer};
@@ -32,6 +34,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Instant;
+use views::Views;
 
 /// Steps between two looks at the counters, as in `nerf train`.
 const BLOCK: u32 = 16;
@@ -61,6 +64,9 @@ struct Args {
     /// Seconds of training before, so that the occupancy grid has found the scene
     #[arg(long, default_value = "30")]
     warm: f64,
+    /// Views to render after it, as the training cameras see
+    #[arg(long, default_value = "8")]
+    views: usize,
     /// The adapter: an index of `nerf adapters`, or parts of its name and backend [default: the first]
     #[arg(long)]
     adapter: Option<String>,
@@ -139,10 +145,23 @@ struct Throughput {
     samples_per_second_of_two_cores: Option<f64>,
 }
 
+/// All that is measured.
+#[derive(Debug, Default, Serialize)]
+struct Measured {
+    #[serde(rename = "cold_start")]
+    start: Option<Start>,
+    throughput: Throughput,
+    views: Views,
+    /// Empty where the adapter has no timestamps.
+    stages: Vec<StageTime>,
+}
+
 /// A training run ready for its first step.
 struct Run {
     gpu: Arc<Gpu>,
     trainer: Trainer,
+    /// Those that it is trained on.
+    cameras: Vec<Camera>,
     learning_rate: f64,
     start: Start,
 }
@@ -168,13 +187,16 @@ fn main() -> Result<()> {
     say("measuring");
     let throughput = run.train(args.seconds)?;
     ensure!(throughput.samples > 0, "the rays meet nothing: the field is empty");
-    // Should the stages hang, the throughput is known.
-    save(&args, &result(&args, &run, start.as_ref(), &throughput, &[]))?;
+    let mut measured = Measured { start, throughput, ..Measured::default() };
+    // Should what follows hang, the throughput is known.
+    save(&args, &result(&args, &run, &measured))?;
+    say("rendering views");
+    measured.views = Views::measure(run.trainer.field(), &run.cameras, args.views)?;
     say("timing the stages");
-    let stages = run.stages(&ceilings)?;
-    let result = result(&args, &run, start.as_ref(), &throughput, &stages);
+    measured.stages = run.stages(&ceilings)?;
+    let result = result(&args, &run, &measured);
     save(&args, &result)?;
-    let text = if args.json { result.to_string() } else { table(&result, start, &throughput, &stages) };
+    let text = if args.json { result.to_string() } else { table(&result, &measured) };
     Ok(writeln!(std::io::stdout(), "{text}")?)
 }
 
@@ -264,11 +286,12 @@ impl Run {
         let plan = Plan::for_dataset(&gpu, &dataset, config)?;
         let views = TrainingPhotos::of(&dataset).load(&gpu, &plan, &mut ())?;
         start.dataset_seconds += lap();
+        let cameras = dataset.train.iter().map(|&index| dataset.frames[index].camera.clone()).collect();
         let mut trainer = Trainer::new(Field::new(&gpu, plan)?, views)?;
         start.kernels_seconds = lap();
         trainer.warm_up()?;
         start.warm_up_seconds = lap();
-        Ok(Self { gpu, trainer, learning_rate, start })
+        Ok(Self { gpu, trainer, cameras, learning_rate, start })
     }
 
     /// Trains for some seconds, in blocks.

@@ -1,30 +1,27 @@
 //! `nerf render`: a trained field seen from any cameras.
 
 mod frame_folder;
+mod frames;
 mod framing;
+mod writer;
 
 use super::Session;
 use crate::cli::{Format, PictureBackground, Render};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use frame_folder::{Earlier, FrameFolder};
+use frames::{Timing, render_and_write};
 use framing::{framed, samples};
 use nerf::camera::orbit::Orbit;
 use nerf::camera::{Bounds, Camera, LensKind};
 use nerf::capture::dataset::{UsualView, read_cameras, with_extensions};
-use nerf::capture::image_file::{ExrPixels, Precision, write_exr, write_png_rgba8};
-use nerf::field::renderer::{Renderer, View};
-use nerf::photo::color_space::{ColorSpace, depth_srgb8, opaque_srgb8};
 use nerf::run::TrainedField;
 use nerf::support::file::{available_bytes, first_within};
 use nerf::support::format::{bytes, count, plural};
 use serde_json::{Map, Value, json};
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::panic::resume_unwind;
 use std::path::Path;
-use std::sync::mpsc;
-use std::thread;
-use std::time::Instant;
+use writer::Writer;
 
 /// A camera to render, and where it comes from.
 struct Job {
@@ -37,15 +34,6 @@ struct Job {
 
 /// Most pixels along a side of a rendered image.
 const MOST_PIXELS: u32 = 16_384;
-
-/// How rendered views become files.
-struct Writer<'a> {
-    args: &'a Render,
-    color_space: ColorSpace,
-    /// Depths that are white and black in depth pictures, in world units.
-    depth_range: [f64; 2],
-    folder: FrameFolder,
-}
 
 pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     let field = session.load_field(&args.run)?;
@@ -74,20 +62,21 @@ pub(super) fn run(args: &Render, session: &Session<'_>) -> Result<()> {
     }
     let all = jobs.len();
     jobs.retain(|job| args.overwrite || !kept.contains(&(job.index as u64)));
-    let mut seconds = Vec::new();
+    let mut timing = Timing::default();
     if !jobs.is_empty() {
         warn_of_full_disk(args, &jobs, session);
         let gpu = session.open_gpu()?;
         let lenses = LensKind::among(jobs.iter().map(|job| &job.camera));
         let mut renderer = field.renderer(&gpu, &lenses)?;
-        let writer = Writer { args, color_space: field.color_space(), depth_range: range, folder };
+        let writer = Writer::new(args, field.color_space(), range, folder);
         say_samples(args, &jobs, session);
         let progress = Progress::new(session.console, "rendering");
         session.end_gracefully()?;
-        seconds = render_and_write(&mut renderer, &jobs, writer, &progress)?;
+        timing = render_and_write(&mut renderer, &jobs, &writer, &progress)?;
     }
     let (out, skipped) = (args.out.display().to_string(), all - jobs.len());
-    let result = json!({ "out": out, "frames": jobs.len(), "skipped": skipped, "seconds": seconds });
+    let mut result = json!({ "out": out, "frames": jobs.len(), "skipped": skipped });
+    timing.tell(&mut result);
     let were_there = if skipped > 0 { format!(", {skipped} were there already") } else { String::new() };
     session.print(&result, &format!("{} in {out}{were_there}", count(jobs.len(), "frame")))
 }
@@ -159,43 +148,6 @@ fn say_samples(args: &Render, jobs: &[Job], session: &Session<'_>) {
     }
 }
 
-/// Renders the jobs in order, describes their files, and returns the seconds that each took to render. A thread writes those
-/// of one view while the next one renders.
-fn render_and_write(
-    renderer: &mut Renderer,
-    jobs: &[Job],
-    mut writer: Writer<'_>,
-    progress: &Progress,
-) -> Result<Vec<f64>> {
-    thread::scope(|scope| {
-        // Without room in between: the next view waits until the last one is written.
-        let (sender, views) = mpsc::sync_channel::<(&Job, View)>(0);
-        let writing = scope.spawn(move || {
-            let written = views.iter().try_for_each(|(job, view)| writer.write(job, &view));
-            let listed = writer.folder.flush();
-            written.and(listed)
-        });
-        let mut render = || -> Result<Vec<f64>> {
-            let mut seconds = Vec::with_capacity(jobs.len());
-            for (number, job) in jobs.iter().enumerate() {
-                let clock = Instant::now();
-                let view = renderer.render_sampled(&job.camera, job.samples)?;
-                seconds.push(clock.elapsed().as_secs_f64());
-                // Nobody receives it where writing failed, which is reported below.
-                if sender.send((job, view)).is_err() {
-                    break;
-                }
-                progress.count(number + 1, jobs.len(), "frames");
-            }
-            Ok(seconds)
-        };
-        let rendered = render();
-        drop(sender);
-        writing.join().unwrap_or_else(|panic| resume_unwind(panic))?;
-        rendered
-    })
-}
-
 /// All cameras of the path.
 fn jobs(args: &Render, field: &TrainedField) -> Result<Vec<Job>> {
     let metadata = field.metadata();
@@ -263,56 +215,4 @@ fn depth_range(bounds: &Bounds, jobs: &[Job]) -> [f64; 2] {
     let (nearest, farthest) =
         distances.fold((f64::INFINITY, 0.0f64), |(near, far), d| (near.min(d), far.max(d)));
     [(nearest - reach).max(0.0), farthest + reach]
-}
-
-impl Writer<'_> {
-    /// Writes the files of a view and lists them.
-    fn write(&mut self, job: &Job, view: &View) -> Result<()> {
-        let (stem, args) = (format!("{:04}", job.index), self.args);
-        let mut files = Map::new();
-        if args.format.contains(&Format::Png) {
-            let pixels = match args.background {
-                PictureBackground::Transparent => self.color_space.straight_srgb8(&view.color),
-                PictureBackground::Color(color) => opaque_srgb8(&self.color_space.over(&view.color, color)),
-            };
-            files.insert("png".to_owned(), self.write_png(format!("{stem}.png"), view, &pixels)?);
-        }
-        if args.format.contains(&Format::Exr) {
-            let file = format!("{stem}.exr");
-            let color = self.color_space.linear(&view.color);
-            let depth = self.depth(view);
-            let pixels = ExrPixels { color: &color, depth: Some(&depth) };
-            let precision = if args.half { Precision::Half } else { Precision::Float };
-            write_exr(&args.out.join(&file), view.width, view.height, &pixels, precision)?;
-            files.insert("exr".to_owned(), json!(file));
-        }
-        if args.depth {
-            let mut pixels = depth_srgb8(&self.depth(view), &view.color, self.depth_range.map(|z| z as f32));
-            if args.far_depth.is_some() {
-                let empty = pixels.iter_mut().zip(&view.depth).filter(|(_, depth)| **depth == 0.0);
-                empty.for_each(|(pixel, _)| pixel[3] = u8::MAX);
-            }
-            files.insert("depth".to_owned(), self.write_png(format!("{stem}_depth.png"), view, &pixels)?);
-        }
-        let frame = json!({
-            "index": job.index,
-            "source": job.source,
-            "width": view.width,
-            "height": view.height,
-            "spp": job.samples,
-            "files": files,
-        });
-        self.folder.add(job.index, frame)
-    }
-
-    /// The depth of every pixel, where there is none as asked for.
-    fn depth(&self, view: &View) -> Vec<f32> {
-        let far = self.args.far_depth.unwrap_or(0.0);
-        view.depth.iter().map(|&depth| if depth > 0.0 { depth } else { far }).collect()
-    }
-
-    fn write_png(&self, file: String, view: &View, pixels: &[[u8; 4]]) -> Result<Value> {
-        write_png_rgba8(&self.args.out.join(&file), view.width, view.height, pixels)?;
-        Ok(Value::String(file))
-    }
 }

@@ -3,6 +3,7 @@
 use super::Gpu;
 use anyhow::{Result, ensure};
 use bytemuck::Pod;
+use std::ops::Range;
 use wgpu::BufferUsages as Usage;
 
 /// A device buffer; its label is the name kernels bind it by.
@@ -77,28 +78,57 @@ impl Gpu {
     /// # Errors
     /// When the device was lost.
     pub fn read<T: Pod>(&self, buffer: &Buffer, first: usize, count: usize) -> Result<Vec<T>> {
-        if count == 0 {
-            return Ok(Vec::new());
-        }
-        let bytes = (count * size_of::<T>()) as u64;
-        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
+        let staging = self.staging::<T>(count);
+        self.read_through(&staging, buffer, first..first + count, |elements: &[T]| elements.to_vec())
+    }
+
+    /// Memory that the host reads, with room for `count` elements of `T`.
+    #[must_use]
+    pub fn staging<T: Pod>(&self, count: usize) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("read back"),
-            size: bytes.next_multiple_of(4),
+            size: staged_bytes::<T>(count).max(4),
             usage: Usage::MAP_READ | Usage::COPY_DST,
             mapped_at_creation: false,
-        });
+        })
+    }
+
+    /// Copies `elements` of `buffer` to `staging`, waits for the device, and gives `take` what is there.
+    ///
+    /// # Errors
+    /// When the device was lost.
+    pub fn read_through<T: Pod, R>(
+        &self,
+        staging: &wgpu::Buffer,
+        buffer: &Buffer,
+        elements: Range<usize>,
+        take: impl FnOnce(&[T]) -> R,
+    ) -> Result<R> {
+        if elements.is_empty() {
+            return Ok(take(&[]));
+        }
+        let bytes = staged_bytes::<T>(elements.len());
         let mut encoder = self.encoder("read back");
         encoder.copy_buffer_to_buffer(
             &buffer.raw,
-            (first * size_of::<T>()) as u64,
-            &staging,
+            (elements.start * size_of::<T>()) as u64,
+            staging,
             0,
-            bytes.next_multiple_of(4),
+            bytes,
         );
         self.submit(encoder);
-        staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        staging.map_async(wgpu::MapMode::Read, ..bytes, |_| {});
         self.wait()?;
-        let mapped = staging.get_mapped_range(..).map_err(|failure| self.lost(failure))?;
-        Ok(bytemuck::pod_collect_to_vec(&mapped[..bytes as usize]))
+        let taken = {
+            let mapped = staging.get_mapped_range(..bytes).map_err(|failure| self.lost(failure))?;
+            take(bytemuck::cast_slice(&mapped[..elements.len() * size_of::<T>()]))
+        };
+        staging.unmap();
+        Ok(taken)
     }
+}
+
+/// Bytes of a copy of so many elements, which are whole words.
+fn staged_bytes<T>(count: usize) -> u64 {
+    ((count * size_of::<T>()) as u64).next_multiple_of(4)
 }
