@@ -8,6 +8,7 @@ pub mod buffer_spec;
 pub mod kernel;
 pub mod paged_array;
 pub mod pass;
+mod pipeline;
 pub mod source;
 pub mod tensor;
 pub mod timer;

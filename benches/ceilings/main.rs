@@ -140,7 +140,7 @@ impl Bench {
     fn time(&self, stage: &Stage) -> Result<f64> {
         let run = |times: usize| -> Result<f64> {
             let clock = Instant::now();
-            self.gpu.run("ceiling", repeat_n(stage, times), None);
+            self.gpu.run("ceiling", repeat_n(stage, times), None)?;
             self.gpu.wait()?;
             Ok(clock.elapsed().as_secs_f64() / times as f64)
         };
@@ -212,7 +212,7 @@ impl Bench {
         let stage = self.stage(name, Source::new(name).part(name, text), &[&self.sink], 1)?;
         let run = |times: usize| -> Result<f64> {
             let clock = Instant::now();
-            self.gpu.run("empty", repeat_n(&stage, times), None);
+            self.gpu.run("empty", repeat_n(&stage, times), None)?;
             self.gpu.wait()?;
             Ok(clock.elapsed().as_secs_f64())
         };

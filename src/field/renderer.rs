@@ -71,7 +71,7 @@ impl Renderer {
     /// A renderer of a field, for cameras with `lenses`.
     ///
     /// # Errors
-    /// Without lenses, or when the adapter cannot hold a round or refuses a kernel.
+    /// Without lenses, or when the adapter cannot hold a round, or binds less than a kernel needs.
     pub fn new(field: &Field, lenses: &BTreeSet<LensKind>) -> Result<Self> {
         ensure!(
             !lenses.is_empty(),
@@ -109,7 +109,8 @@ impl Renderer {
     /// Renders what `camera` sees.
     ///
     /// # Errors
-    /// When the device was lost, its interrupt was raised, or the camera has a lens that was not linked.
+    /// When the driver refuses a kernel, the device was lost, its interrupt was raised, or the camera has a lens that was not
+    /// linked.
     pub fn render(&mut self, camera: &Camera) -> Result<View> {
         let (kind, lenses) = (camera.lens.kind(), &self.plan.features.lenses);
         if !lenses.contains(&kind) {
@@ -171,7 +172,7 @@ impl Renderer {
     /// rays are left, and few more at a time after that. At most two submissions are under way, so that a wish to stop is
     /// heard soon.
     fn render_band(&mut self, band: Range<usize>, step_excess: f32) -> Result<()> {
-        self.begin_band(&band, step_excess);
+        self.begin_band(&band, step_excess)?;
         let rays = self.plan.capacity.rays;
         // A ray has a sample or more in each of its rounds, and no slot stays free.
         let most = (band.len() / rays + 1) * (self.plan.config.march.most_steps + 1);
@@ -183,7 +184,7 @@ impl Renderer {
                 self.gpu.interrupt.check()?;
                 let stages = self.round.iter().chain([&self.refill]);
                 let rounds = repeat_n(stages, MOST_ROUNDS.min(more - begun)).flatten();
-                let submission = self.gpu.run("rounds of a view", rounds, None);
+                let submission = self.gpu.run("rounds of a view", rounds, None)?;
                 under_way.replace(submission).map_or(Ok(()), |earlier| self.gpu.wait_for(earlier))?;
             }
             submitted += more;
@@ -206,7 +207,7 @@ impl Renderer {
     }
 
     /// Frees every slot, and gives each that is needed a pixel.
-    fn begin_band(&self, band: &Range<usize>, step_excess: f32) {
+    fn begin_band(&self, band: &Range<usize>, step_excess: f32) -> Result<()> {
         let Self { gpu, workspace, .. } = self;
         let rays = self.plan.capacity.rays.min(band.len()) as u32;
         workspace.write(
@@ -220,6 +221,7 @@ impl Renderer {
             Progress { next_pixel: begin, band_begin: begin, band_end: end, ..Progress::default() };
         workspace.write(gpu, "progress", &[progress]);
         workspace.write(gpu, "view_slots", &vec![[0u32, 1]; rays as usize]);
-        gpu.run("first round of a view", [&self.refill], None);
+        gpu.run("first round of a view", [&self.refill], None)?;
+        Ok(())
     }
 }

@@ -55,10 +55,10 @@ pub struct StepStats {
 }
 
 impl Trainer {
-    /// Allocates, uploads and builds every kernel; parameters start from the configuration's seed.
+    /// Allocates, uploads and begins to compile every kernel; parameters start from the configuration's seed.
     ///
     /// # Errors
-    /// When a photo is missing, or the adapter cannot hold the table or the batch or refuses a kernel.
+    /// When a photo is missing, or the adapter cannot hold the table or the batch, or binds less than a kernel needs.
     pub fn new(mut field: Field, views: TrainingViews) -> Result<Self> {
         field.check_whole()?;
         views.check_for(&field.plan)?;
@@ -83,7 +83,7 @@ impl Trainer {
     /// Runs every kernel once, so that drivers that compile at the first dispatch have done so, and starts over.
     ///
     /// # Errors
-    /// When the device was lost or a kernel failed.
+    /// When the driver refuses a kernel, the device was lost or a kernel failed.
     pub fn warm_up(&mut self) -> Result<()> {
         self.step(0.0, None)?;
         self.refresh_occupancy(None)?;
@@ -151,7 +151,7 @@ impl Trainer {
     /// render·loss·gradient → backward → Adam. Submits and returns; [`Trainer::report`] waits.
     ///
     /// # Errors
-    /// When the device reported an error.
+    /// When the driver refuses a kernel, or the device reported an error.
     pub fn step(&mut self, learning_rate: f64, mut timer: Option<&mut Timer>) -> Result<()> {
         let grid = &self.field.plan.config.occupancy;
         if self.step > 0 && self.step.is_multiple_of(grid.interval) {
@@ -161,7 +161,7 @@ impl Trainer {
         let optimizer = &self.field.plan.config.optimizer;
         let step = Step { stream: self.stream(), ..Step::learning(optimizer, self.step, learning_rate) };
         self.field.gpu.write(self.workspace.get("step"), 0, &[step]);
-        self.field.gpu.run("step", &self.stages, timer.as_deref_mut());
+        self.field.gpu.run("step", &self.stages, timer.as_deref_mut())?;
         if let Some(timer) = timer {
             timer.collect(&self.field.gpu, None)?;
         }
@@ -242,12 +242,12 @@ impl Trainer {
                 ..Step::default()
             };
             self.field.gpu.write(self.workspace.get("step"), 0, &[step]);
-            self.field.gpu.run(OCCUPANCY, self.occupancy.chunk(count as usize), timer.as_deref_mut());
+            self.field.gpu.run(OCCUPANCY, self.occupancy.chunk(count as usize), timer.as_deref_mut())?;
             if let Some(timer) = timer.as_deref_mut() {
                 timer.collect(&self.field.gpu, Some(OCCUPANCY))?;
             }
         }
-        self.field.gpu.run(OCCUPANCY, self.occupancy.bits(), timer.as_deref_mut());
+        self.field.gpu.run(OCCUPANCY, self.occupancy.bits(), timer.as_deref_mut())?;
         timer.map_or(Ok(()), |timer| timer.collect(&self.field.gpu, Some(OCCUPANCY)))
     }
 }

@@ -2,10 +2,10 @@
 
 use super::Gpu;
 use super::buffer::Buffer;
+use super::pipeline::{Job, Pipeline};
 use super::source::{Binding, Linked, Source};
 use super::tensor::{Tensor, TensorStorage};
 use anyhow::{Result, anyhow, bail};
-use std::borrow::Cow;
 use wgpu::naga;
 
 /// Name, fields and size of a `#[repr(C)]` struct that is shared with WGSL.
@@ -46,12 +46,12 @@ macro_rules! gpu_struct {
     };
 }
 
-/// A compiled kernel with the entry point `main`.
+/// A kernel with the entry point `main`, which the driver may still compile.
 #[derive(Debug)]
 pub struct Kernel {
     /// The kernel's name, also in profiles.
     pub label: String,
-    pipeline: wgpu::ComputePipeline,
+    pipeline: Pipeline,
     group: wgpu::BindGroupLayout,
     bindings: Vec<Binding>,
     group_size: u32,
@@ -64,7 +64,7 @@ pub struct Bound {
     pub label: String,
     /// Threads of a workgroup along x, as its shader says.
     pub group_size: u32,
-    pub(super) pipeline: wgpu::ComputePipeline,
+    pub(super) pipeline: Pipeline,
     pub(super) group: wgpu::BindGroup,
 }
 
@@ -111,11 +111,12 @@ impl Tensor {
 }
 
 impl Kernel {
-    /// Links `source`, compares the structs that it names with `layouts` and creates the pipeline.
+    /// Links `source`, compares the structs that it names with `layouts` and begins to compile the pipeline. That the driver
+    /// refuses it is told where it runs, by [`Gpu::run`].
     ///
     /// # Errors
-    /// When the WGSL does not link, a struct differs from Rust's, the driver refuses the pipeline, or the device's interrupt
-    /// was raised.
+    /// When the WGSL does not link, a struct differs from Rust's, it has more bindings than the adapter takes, or the
+    /// device's interrupt was raised.
     pub fn new(gpu: &Gpu, source: &Source, layouts: &[StructLayout]) -> Result<Self> {
         gpu.interrupt.check()?;
         let Linked { label, module, bindings, group_size } = source.link()?;
@@ -123,33 +124,14 @@ impl Kernel {
             compare_layout(&label, &module, layout)?;
         }
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(&label),
-            source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
-        });
         let group = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some(&label),
             entries: &layout_entries(&bindings),
         });
-        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(&label),
-            bind_group_layouts: &[Some(&group)],
-            immediate_size: 0,
-        });
-        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(&label),
-            layout: Some(&layout),
-            module: &shader,
-            entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                zero_initialize_workgroup_memory: false,
-                ..Default::default()
-            },
-            cache: None,
-        });
         if let Some(error) = pollster::block_on(scope.pop()) {
             bail!("creating the kernel '{label}' on '{}': {error}", gpu.info.name);
         }
+        let pipeline = Pipeline::begin(gpu, Job { label: label.clone(), module, group: group.clone() });
         Ok(Self { label, pipeline, group, bindings, group_size })
     }
 

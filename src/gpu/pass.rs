@@ -4,6 +4,7 @@ use super::Gpu;
 use super::buffer::Buffer;
 use super::kernel::Bound;
 use super::timer::Timer;
+use anyhow::Result;
 
 /// How many workgroups a stage launches.
 #[derive(Clone, Debug)]
@@ -69,8 +70,8 @@ impl Stage {
         self.size = Size::Fixed(self.bound.groups(threads), 1);
     }
 
-    fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
-        pass.set_pipeline(&self.bound.pipeline);
+    fn record(&self, pass: &mut wgpu::ComputePass<'_>) -> Result<()> {
+        pass.set_pipeline(&self.bound.pipeline.get()?);
         pass.set_bind_group(0, &self.bound.group, &[]);
         match &self.size {
             Size::Fixed(x, y) => pass.dispatch_workgroups(*x, *y, 1),
@@ -78,17 +79,22 @@ impl Stage {
                 pass.dispatch_workgroups_indirect(&buffer.raw, (index * 4 * size_of::<u32>()) as u64);
             }
         }
+        Ok(())
     }
 }
 
 impl Gpu {
-    /// Submits `stages` in order; with a timer, each in a pass of its own between two timestamps.
+    /// Submits `stages` in order, once the driver has compiled them; with a timer, each in a pass of its own between two
+    /// timestamps.
+    ///
+    /// # Errors
+    /// When the driver refuses a kernel, or the device's interrupt was raised before it was compiled.
     pub fn run<'a>(
         &self,
         label: &str,
         stages: impl IntoIterator<Item = &'a Stage>,
         timer: Option<&mut Timer>,
-    ) -> wgpu::SubmissionIndex {
+    ) -> Result<wgpu::SubmissionIndex> {
         let mut encoder = self.encoder(label);
         if let Some(timer) = timer {
             for stage in stages {
@@ -97,7 +103,7 @@ impl Gpu {
                     label: Some(&stage.bound.label),
                     timestamp_writes: writes,
                 });
-                stage.record(&mut pass);
+                stage.record(&mut pass)?;
             }
             timer.resolve(&mut encoder);
         } else {
@@ -106,9 +112,9 @@ impl Gpu {
                 timestamp_writes: None,
             });
             for stage in stages {
-                stage.record(&mut pass);
+                stage.record(&mut pass)?;
             }
         }
-        self.submit(encoder)
+        Ok(self.submit(encoder))
     }
 }

@@ -121,14 +121,15 @@ impl<'a> TrainingRun<'a> {
         let load_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let mut trainer = Trainer::new(Field::new(&gpu, resolved.plan.clone())?, views)?;
-        trainer.warm_up()?;
-        // It is as large as the field, and not needed any more.
-        let state = resolved.state.take();
-        state.as_ref().map_or(Ok(()), |state| trainer.restore(state))?;
+        // While its kernels are compiled, which the first steps wait for.
         let evaluator = match evaluation.few(FEW_VIEWS) {
             Some(few) => resolved.evaluator(trainer.field(), dataset, few)?,
             None => None,
         };
+        trainer.warm_up()?;
+        // It is as large as the field, and not needed any more.
+        let state = resolved.state.take();
+        state.as_ref().map_or(Ok(()), |state| trainer.restore(state))?;
         let compile_seconds = clock.elapsed().as_secs_f64();
         let Resolved { metadata, plan, test, .. } = resolved;
         folder.make_again(&metadata.config)?;

@@ -8,6 +8,7 @@ mod bench;
 mod checks;
 mod close;
 mod composite;
+mod device;
 mod grid;
 mod marching;
 mod occupancy;

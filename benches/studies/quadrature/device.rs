@@ -185,7 +185,7 @@ fn median_seconds(bench: &Workbench, stages: &[Stage], timer: &mut Timer, repeat
     let mut times = Vec::new();
     for _ in 0..=repeats {
         let before: f64 = timer.totals().values().sum();
-        bench.gpu.run("quadrature", stages, Some(&mut *timer));
+        bench.gpu.run("quadrature", stages, Some(&mut *timer))?;
         timer.collect(&bench.gpu, None)?;
         times.push(timer.totals().values().sum::<f64>() - before);
     }

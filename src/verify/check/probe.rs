@@ -50,7 +50,7 @@ impl Probe<'_> {
         let link = self.variants.iter().fold(link, |link, (slot, variant)| link.with(slot, variant));
         let kernel = plan.kernel(gpu, &link)?;
         let bound = workspace.bind(gpu, &kernel, &[])?;
-        gpu.run("check", [&Stage::over(bound, cases)], None);
+        gpu.run("check", [&Stage::over(bound, cases)], None)?;
         let outputs: Vec<[f32; 4]> = workspace.read(gpu, "probe_outputs", cases * OUTPUTS)?;
         Ok(outputs.as_chunks().0.to_vec())
     }

@@ -138,7 +138,7 @@ impl Workbench {
     /// # Errors
     /// When the device was lost or refused a command.
     pub fn run<'a>(&self, stages: impl IntoIterator<Item = &'a Stage>) -> Result<()> {
-        self.gpu.run("check", stages, None);
+        self.gpu.run("check", stages, None)?;
         self.gpu.wait()
     }
 
