@@ -1,26 +1,36 @@
 // Ends a step: sums the errors of its rays and chooses the number of rays of the next one, so that the kept samples
-// meet their target and the marched ones fit. One workgroup.
+// meet their target and the marched ones fit. One workgroup, whose threads have four rays under way at once.
 // needs: counters, dispatch, group, ray_result, usable
 
-var<storage, read> ray_results: array<RayResult>;
-var<workgroup> sums: array<vec4<f32>, GROUP_SIZE>;
+const THREADS = 256u;
 
-@compute @workgroup_size(GROUP_SIZE)
+var<storage, read> ray_results: array<RayResult>;
+var<workgroup> sums: array<vec4<f32>, THREADS>;
+
+fn errors_of(ray: u32, rays: u32) -> vec4<f32> {
+    return select(vec4(0.0), ray_results[ray].errors, ray < rays);
+}
+
+@compute @workgroup_size(THREADS)
 fn main(@builtin(local_invocation_index) thread: u32) {
     let rays = counters.rays_used;
     var sum = vec4(0.0);
-    for (var i = thread; i < rays; i += GROUP_SIZE) {
-        sum += ray_results[i].errors;
+    for (var ray = thread; ray < rays; ray += 4u * THREADS) {
+        sum += (errors_of(ray, rays) + errors_of(ray + THREADS, rays))
+            + (errors_of(ray + 2u * THREADS, rays) + errors_of(ray + 3u * THREADS, rays));
     }
     sums[thread] = sum;
     workgroupBarrier();
+    for (var half = THREADS / 2u; half > 0u; half /= 2u) {
+        if thread < half {
+            sums[thread] += sums[thread + half];
+        }
+        workgroupBarrier();
+    }
     if thread != 0u {
         return;
     }
-    var total = vec4(0.0);
-    for (var i = 0u; i < GROUP_SIZE; i++) {
-        total += sums[i];
-    }
+    let total = sums[0];
     let used = f32(max(rays, 1u));
     counters.sum_steps += 1u;
     counters.sum_rays += rays;

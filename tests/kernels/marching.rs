@@ -1,11 +1,11 @@
 //! Marching where there is nothing, or more than fits.
 
 use anyhow::Result;
-use nerf::field::march::SPARE_ROWS;
+use nerf::field::march::{SPARE_ROWS, Scanned, scan};
 use nerf::verify::check::Setup;
 use nerf::verify::check::marching::Marching;
 
-use crate::bench::adapter;
+use crate::bench::{adapter, workbench};
 
 /// A full occupancy grid.
 fn full(marching: &Marching) -> Vec<u32> {
@@ -49,5 +49,33 @@ fn too_many_samples() -> Result<()> {
     assert!(kept[samples..].iter().all(|sample| *sample == [-7.0; 4]));
     let spans: Vec<[u32; 2]> = small.bench.read("ray_spans", count)?;
     assert!(spans[used..].iter().all(|span| *span == [0, 0]));
+    Ok(())
+}
+
+/// A scan over more rays than a workgroup takes at once, where all samples fit and where only some do.
+#[test]
+fn many_rays_are_scanned() -> Result<()> {
+    let rays = 2500;
+    let counts: Vec<u32> = (0..rays).map(|ray| ray * 7 % 13).collect();
+    let wanted: u32 = counts.iter().sum();
+    for capacity in [wanted, wanted - 1, wanted / 3, 512] {
+        let mut setup = Setup::tiny();
+        (setup.config.batch.samples, setup.config.batch.rays) = (capacity as usize, 4096);
+        let bench = workbench(setup)?;
+        bench.write("ray_spans", &counts.iter().map(|&count| [9, count]).collect::<Vec<_>>());
+        bench.set_rays(counts.len());
+        bench.run([&scan(&bench.gpu, &bench.plan, &bench.workspace, Scanned::Samples)?])?;
+        let (mut first, mut spans, mut used, mut samples) = (0, Vec::new(), 0, 0);
+        for &count in &counts {
+            let fits = first + count <= capacity;
+            spans.push(if fits { [first, count] } else { [0, 0] });
+            first += count;
+            (used, samples) = if fits { (used + 1, first) } else { (used, samples) };
+        }
+        let counters = bench.counters()?;
+        let found = (counters.rays_used, counters.samples, counters.samples_wanted);
+        assert_eq!(found, (used, samples, wanted), "room for {capacity}");
+        assert_eq!(bench.read::<[u32; 2]>("ray_spans", counts.len())?, spans, "room for {capacity}");
+    }
     Ok(())
 }
