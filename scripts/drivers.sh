@@ -37,6 +37,7 @@ paths='
 own
 ordered      --accumulation ordered
 fixed        --accumulation fixed
+long         --accumulation long
 float        --accumulation float
 exchange     --accumulation exchange
 buffers      --memory buffers

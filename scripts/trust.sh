@@ -61,7 +61,7 @@ check() {
 
 : >"$out/check.txt"
 check 'the path it takes'
-for accumulation in ordered fixed float exchange; do
+for accumulation in ordered fixed long float exchange; do
     check "$accumulation" --accumulation "$accumulation"
 done
 check 'buffers' --memory buffers

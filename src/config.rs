@@ -204,19 +204,29 @@ pub enum Transmittance {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Accumulation {
-    /// Ordered on CPU adapters; elsewhere fixed where the run is deterministic, else float atomics, else
+    /// Ordered on CPU adapters; elsewhere long or fixed where the run is deterministic, else float atomics, else
     /// compare-exchange where there are none.
     #[default]
     Auto,
     /// One thread per level adds in the order of the samples: no atomics, and every run gives the same sum. On a CPU
-    /// adapter, batches beyond 43,690 kept samples take fixed instead.
+    /// adapter, batches beyond 43,690 kept samples take long or fixed instead.
     Ordered,
     /// 64-bit integers, each in two 32-bit atomics: independent of order.
     Fixed,
+    /// The same sums, by one 64-bit atomic each.
+    Long,
     /// Float atomics.
     Float,
     /// Compare-exchange on the bits.
     Exchange,
+}
+
+impl Accumulation {
+    /// Whether gradients are summed as 64-bit integers.
+    #[must_use]
+    pub fn is_of_integers(self) -> bool {
+        matches!(self, Self::Fixed | Self::Long)
+    }
 }
 
 impl Default for Grid {

@@ -46,7 +46,12 @@ pub const WANTED_FEATURES: wgpu::Features = wgpu::Features::SHADER_FLOAT32_ATOMI
     .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
     .union(wgpu::Features::CLEAR_TEXTURE)
     .union(wgpu::Features::SUBGROUP)
+    .union(LONG_ATOMICS)
     .union(wgpu::Features::TIMESTAMP_QUERY);
+
+/// Atomic addition of 64-bit integers.
+pub const LONG_ATOMICS: wgpu::Features =
+    wgpu::Features::SHADER_INT64.union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS);
 
 impl Gpu {
     /// Opens the adapter that `choice` names, as [`adapter::choose`] understands it; the first one where it names none.

@@ -1,7 +1,7 @@
 //! How much a stage has to do at least: what its formulas multiply, and what it must read and write once, whatever caches
 //! do. What a stage does beyond that (index arithmetic, weights read again) counts for nothing, but Adam counts as if every
 //! entry of the table were touched. Caches can take a stage above the ceiling of memory; so can samples that lie together
-//! and levels that are small above that of gathers from anywhere.
+//! and levels that are small above those of gathers and atomics from anywhere: what lies in one cell is added at once.
 
 use nerf::config::Accumulation;
 use nerf::field::Plan;
@@ -107,7 +107,7 @@ impl Work {
         let sums = match plan.accumulation {
             _ if self.of_occupancy => "integer",
             Accumulation::Float => "float",
-            Accumulation::Fixed => "integer",
+            Accumulation::Fixed | Accumulation::Long => "integer",
             _ => "exchange",
         };
         let at =

@@ -11,4 +11,6 @@ fn dispatch_over_samples(count: u32) {
 fn dispatch_over_kept(count: u32) {
     dispatch[DISPATCH_KEPT] = workgroups(count, 1u);
     dispatch[DISPATCH_KEPT_TILES] = workgroups(count, SAMPLES_PER_THREAD);
+    // Four threads for a run.
+    dispatch[DISPATCH_SCATTER] = vec3(workgroups(count, SCATTER_RUN / 4u).x, LEVELS, 1u);
 }

@@ -2,10 +2,11 @@
 
 var<storage, read_write> d_table: array<atomic<u32>>;
 
-fn gradient_add_scalar(index: u32, gradient: f32) {
+fn gradient_add(entry: u32, feature: u32, gradient: f32) {
     if gradient == 0.0 {
         return;
     }
+    let index = 2u * entry + feature;
     var old = atomicLoad(&d_table[index]);
     loop {
         let sum = bitcast<u32>(bitcast<f32>(old) + gradient);
@@ -15,9 +16,4 @@ fn gradient_add_scalar(index: u32, gradient: f32) {
         }
         old = outcome.old_value;
     }
-}
-
-fn gradient_add(entry: u32, gradient: vec2<f32>) {
-    gradient_add_scalar(2u * entry, gradient.x);
-    gradient_add_scalar(2u * entry + 1u, gradient.y);
 }

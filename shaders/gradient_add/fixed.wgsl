@@ -4,7 +4,7 @@
 
 var<storage, read_write> d_table: array<atomic<u32>>;
 
-fn gradient_add_scalar(index: u32, gradient: f32) {
+fn gradient_add(entry: u32, feature: u32, gradient: f32) {
     let size = round(abs(gradient) * power_of_two(gradient_scale_exponent()));
     if size == 0.0 {
         return;
@@ -17,15 +17,11 @@ fn gradient_add_scalar(index: u32, gradient: f32) {
         high = ~high + select(0u, 1u, low == 0u);
         low = ~low + 1u;
     }
-    let old = atomicAdd(&d_table[2u * index], low);
+    let index = 2u * (2u * entry + feature);
+    let old = atomicAdd(&d_table[index], low);
     let carry = select(0u, 1u, old + low < old);
     // Where a small negative number crosses no zero, its upper half and the carry cancel.
     if high + carry != 0u {
-        atomicAdd(&d_table[2u * index + 1u], high + carry);
+        atomicAdd(&d_table[index + 1u], high + carry);
     }
-}
-
-fn gradient_add(entry: u32, gradient: vec2<f32>) {
-    gradient_add_scalar(2u * entry, gradient.x);
-    gradient_add_scalar(2u * entry + 1u, gradient.y);
 }

@@ -34,6 +34,7 @@ fn accumulations() -> OneOf<Accumulation> {
         (Accumulation::Auto, AUTO),
         (Accumulation::Ordered, "In the order of the samples, without atomics"),
         (Accumulation::Fixed, "As integers, independent of order"),
+        (Accumulation::Long, "As integers, by 64-bit atomics"),
         (Accumulation::Float, "By float atomics"),
         (Accumulation::Exchange, "By compare-and-exchange"),
     ])

@@ -15,8 +15,8 @@ impl Config {
         let Self { grid, network, march, occupancy, batch, selection, loss, optimizer, .. } = self;
         if self.deterministic && matches!(self.accumulation, Accumulation::Float | Accumulation::Exchange) {
             bail!(
-                "a deterministic run must not add floats in any order: accumulation must be auto, ordered or \
-                 fixed; found {:?}",
+                "a deterministic run must not add floats in any order: accumulation must be auto, ordered, \
+                 fixed or long; found {:?}",
                 self.accumulation
             );
         }

@@ -12,6 +12,8 @@ pub struct Capabilities {
     pub is_cpu: bool,
     /// It adds floats atomically.
     pub float_atomics: bool,
+    /// It adds 64-bit integers atomically.
+    pub long_atomics: bool,
     /// It has subgroups of a multiple of 8 threads.
     pub subgroups_of_8: bool,
     /// Where its tensors are fast.
@@ -20,8 +22,13 @@ pub struct Capabilities {
 
 impl Capabilities {
     /// A usual GPU.
-    pub const GPU: Self =
-        Self { is_cpu: false, float_atomics: true, subgroups_of_8: true, memory: TensorMemory::Buffers };
+    pub const GPU: Self = Self {
+        is_cpu: false,
+        float_atomics: true,
+        long_atomics: true,
+        subgroups_of_8: true,
+        memory: TensorMemory::Buffers,
+    };
 
     /// Those of an adapter.
     #[must_use]
@@ -29,6 +36,7 @@ impl Capabilities {
         Self {
             is_cpu: gpu.is_cpu(),
             float_atomics: gpu.has(wgpu::Features::SHADER_FLOAT32_ATOMIC),
+            long_atomics: gpu.has(crate::gpu::LONG_ATOMICS),
             subgroups_of_8: gpu.has_subgroups_of(8),
             memory: gpu.fast_memory(),
         }
@@ -49,6 +57,11 @@ impl Capabilities {
             "float accumulation needs atomic addition of floats, and the adapter '{name}' does not have it; leave it \
              out, or ask for exchange or fixed"
         );
+        ensure!(
+            accumulation != Accumulation::Long || self.long_atomics,
+            "long accumulation needs atomic addition of 64-bit integers, and the adapter '{name}' does not have it; \
+             leave it out, or ask for fixed, whose sums are the same"
+        );
         Ok(())
     }
 }
@@ -59,13 +72,14 @@ mod tests {
 
     #[test]
     fn adapters_refuse_sums_that_do_not_suit_them() {
-        let modest = Capabilities { float_atomics: false, ..Capabilities::GPU };
+        let modest = Capabilities { float_atomics: false, long_atomics: false, ..Capabilities::GPU };
         let software = Capabilities { is_cpu: true, ..modest };
         let refusal = |adapter: Capabilities, accumulation| {
             adapter.check(accumulation, "it").err().map(|error| error.to_string()).unwrap_or_default()
         };
         assert!(refusal(Capabilities::GPU, Accumulation::Ordered).contains("one thread"));
         assert!(refusal(modest, Accumulation::Float).contains("exchange or fixed"));
+        assert!(refusal(modest, Accumulation::Long).contains("ask for fixed"));
         for accumulation in [Accumulation::Exchange, Accumulation::Fixed] {
             assert_eq!(refusal(modest, accumulation), "");
         }

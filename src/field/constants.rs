@@ -33,6 +33,10 @@ const RELATIVE_DARKEST: f64 = 1e-3;
 /// Density above which more of it costs the sparsity little, per side of the inner cube.
 const SPARSE_DENSITY: f64 = 5.0;
 
+/// Kept samples, one behind the other, whose gradients are summed before they are added to the table where they share a
+/// cell. A ray has about as many.
+const SCATTER_RUN: usize = 8;
+
 /// Least change of the length of all steps along rays from one training step to the next.
 pub const STEP_SHRINKAGE: f64 = 0.99;
 /// The most.
@@ -75,6 +79,8 @@ impl Plan {
             ("DISPATCH_SAMPLE_TILES", dispatch::SAMPLE_TILES),
             ("DISPATCH_KEPT", dispatch::KEPT),
             ("DISPATCH_KEPT_TILES", dispatch::KEPT_TILES),
+            ("DISPATCH_SCATTER", dispatch::SCATTER),
+            ("SCATTER_RUN", SCATTER_RUN),
             ("RANDOM_IMAGE", dimension::IMAGE as usize),
             ("RANDOM_PIXEL", dimension::PIXEL as usize),
             ("RANDOM_OFFSET", dimension::OFFSET as usize),

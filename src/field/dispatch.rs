@@ -10,5 +10,7 @@ pub const SAMPLE_TILES: usize = 2;
 pub const KEPT: usize = 3;
 /// Over kept samples, several per thread.
 pub const KEPT_TILES: usize = 4;
+/// Over levels and runs of kept samples, four threads each.
+pub const SCATTER: usize = 5;
 /// How many there are.
-pub const COUNT: usize = 5;
+pub const COUNT: usize = 6;

@@ -58,10 +58,11 @@ impl Plan {
         let layout = Layout::new(&config);
         let capacity = Capacity::of_steps(&config.batch);
         let orders = adapter.is_cpu && capacity.kept <= LONGEST_LOOP;
+        let integers = if adapter.long_atomics { Accumulation::Long } else { Accumulation::Fixed };
         let accumulation = match config.accumulation {
-            Accumulation::Ordered if adapter.is_cpu && !orders => Accumulation::Fixed,
+            Accumulation::Ordered if adapter.is_cpu && !orders => integers,
             Accumulation::Auto if orders => Accumulation::Ordered,
-            Accumulation::Auto if config.deterministic => Accumulation::Fixed,
+            Accumulation::Auto if config.deterministic => integers,
             Accumulation::Auto if adapter.float_atomics => Accumulation::Float,
             Accumulation::Auto => Accumulation::Exchange,
             chosen => chosen,

@@ -158,16 +158,16 @@ pub(super) static SLOTS: &[Slot] = &[
         "`accumulation`, adapter",
         &[
             when("fixed", |plan| plan.accumulation == Accumulation::Fixed),
+            when("long", |plan| plan.accumulation == Accumulation::Long),
             when("float", |plan| plan.accumulation == Accumulation::Float),
-            when("exchange", |plan| plan.accumulation == Accumulation::Exchange),
-            otherwise("ordered"),
+            otherwise("exchange"),
         ],
     ),
     slot(
         "gradient_take",
         "`accumulation`, adapter",
         &[
-            when("fixed", |plan| plan.accumulation == Accumulation::Fixed),
+            when("fixed", |plan| plan.accumulation.is_of_integers()),
             when("ordered", |plan| matches!(plan.accumulation, Accumulation::Auto | Accumulation::Ordered)),
             otherwise("float"),
         ],

@@ -16,7 +16,7 @@ pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
     let ordered = plan.accumulation == Accumulation::Ordered;
     let memory = if ordered { plan.memory } else { TensorMemory::Buffers };
     // Integers of 64 bits take twice the room of floats.
-    let words = if plan.accumulation == Accumulation::Fixed { 2 } else { 1 };
+    let words = if plan.accumulation.is_of_integers() { 2 } else { 1 };
     let mut buffers = vec![
         BufferSpec::tensor("d_table", Element::Vec2, plan.layout.entries * words, memory).sized_by(ENTRIES),
         BufferSpec::storage::<u32>("gradient_range", 3),
@@ -65,7 +65,7 @@ fn scatter(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Stage> {
     let ordered = plan.accumulation == Accumulation::Ordered;
     let link = Link::of_file("scatter", if ordered { "scatter_ordered" } else { "scatter" });
     if !ordered {
-        return plan.stage(gpu, workspace, &link, dispatch::KEPT);
+        return plan.stage(gpu, workspace, &link, dispatch::SCATTER);
     }
     Ok(Stage::over(workspace.bind(gpu, &plan.kernel(gpu, &link)?, &[])?, plan.layout.levels.len()))
 }
@@ -99,6 +99,7 @@ fn adam(gpu: &Gpu, plan: &Plan, workspace: &Workspace, array: &Array, learning: 
 pub fn accumulation_name(accumulation: Accumulation) -> &'static str {
     match accumulation {
         Accumulation::Fixed => "integer gradients",
+        Accumulation::Long => "integer gradients in 64 bits",
         Accumulation::Ordered => "ordered gradients",
         Accumulation::Float => "float-atomic gradients",
         Accumulation::Auto | Accumulation::Exchange => "compare-exchange gradients",

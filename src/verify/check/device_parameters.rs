@@ -2,7 +2,7 @@
 
 use super::Workbench;
 use super::inputs::Random;
-use crate::config::{self, Accumulation};
+use crate::config;
 use crate::field::layout::{FEATURES, Layer};
 use crate::verify::reference::ColorRange;
 use crate::verify::reference::grid::GridLevel;
@@ -46,7 +46,7 @@ impl Workbench {
 
     /// The table's gradient `[entries, 2]`, ready for Adam. No sample is kept.
     pub fn set_table_gradient(&self, gradient: &[f32]) {
-        if self.plan.accumulation != Accumulation::Fixed {
+        if !self.plan.accumulation.is_of_integers() {
             return self.write("d_table", gradient);
         }
         let most = gradient.iter().fold(0.0_f32, |most, value| most.max(value.abs()));
