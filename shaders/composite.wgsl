@@ -44,8 +44,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let alpha = opacity(tau);
         let own = vec4(color_load(i).rgb, 1.0);
         weight_store(i, root * (root * alpha));
-        sums[0] = sum_add(sums[0], squared_times(root, gains.x * alpha * own), zero);
-        sums[1] = sum_add(sums[1], squared_times(root, gains.y * alpha * own), zero);
+        sums[0] = sum_add(sums[0], squared_times(root, gains.x * alpha * own, zero), zero);
+        sums[1] = sum_add(sums[1], squared_times(root, gains.y * alpha * own, zero), zero);
         let gain = 0.5 * (gains.x + gains.y);
         distance = depth_forward(distance, i, root, gain * alpha, zero);
         d_color_store(i, vec4(tau, root, spread_before(spread)));
@@ -53,7 +53,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         sparsity += sparsity_error(i, root, gain);
         depth = sum_add(depth, vec4(tau), zero);
     }
-    let through = squared_times(exp_accurate(-0.5 * (depth.value.x + tail)), background);
+    let through = squared_times(exp_accurate(-0.5 * (depth.value.x + tail)), background, zero);
     let first = sums[0].value + through;
     let second = sums[1].value + through;
     let result = 0.5 * (first + second);
@@ -84,9 +84,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let by_depth = depth_gradient(distance, i - 1u, alpha, mean_missing);
         let by_spread = spread_gradient(spread, i - 1u, known.zw, sample_weight, alpha, mean_missing);
         let d_s = part.tau * (gains.x * first + gains.y * second + gain * (by_depth + by_spread));
-        let d_c = squared_times(known.y, alpha * (gains.x * d_results[0] + gains.y * d_results[1])).rgb;
+        let d_c = squared_times(known.y, alpha * (gains.x * d_results[0] + gains.y * d_results[1]), zero).rgb;
         let root = gradient_root(known.y, part.passing_root);
-        d_color_store(i - 1u, vec4(d_c, root * (root * d_s) + sparsity_gradient(i - 1u, known.y, gain)));
+        let d_density = squared_times(root, vec4(d_s), zero).x;
+        d_color_store(i - 1u, vec4(d_c, d_density + sparsity_gradient(i - 1u, known.y, gain)));
         distance = depth_backward(distance, i - 1u, part, zero);
         spread = spread_backward(spread, i - 1u, known.zw, sample_weight, part, zero);
         let parts = array(with_gain(part, gains.x), with_gain(part, gains.y));
@@ -124,14 +125,14 @@ fn with_gain(part: Passage, gain: f32) -> Passage {
 
 // What is seen from in front of a sample, from its colour and what is seen from just behind it.
 fn behind_next(behind: Sum, color: vec4<f32>, part: Passage, zero: u32) -> Sum {
-    let own = own_color(part.passing_root, color);
+    let own = own_color(part.passing_root, color, zero);
     let left_out = part.excess * color - part.taken * behind.value;
     // e^-tau rounds, and would wear out the B of many thin samples.
     let difference = sum_below(own, behind);
     if part.tau < 0.35 {
         return sum_add(sum_add(behind, part.alpha * difference, zero), left_out, zero);
     }
-    return sum_add(sum_add(sum_of(own), -squared_times(part.passing_root, difference), zero), left_out, zero);
+    return sum_add(sum_add(sum_of(own), -squared_times(part.passing_root, difference, zero), zero), left_out, zero);
 }
 
 // The part of the opacity behind a sample that no kept sample stands for.

@@ -64,7 +64,8 @@ fn opacity(tau: f32) -> f32 {
 }
 
 // root^2 * value. Transmittances come as their roots: behind a wall they leave the range of a float where their
-// product with an HDR colour and its error does not.
-fn squared_times(root: f32, value: vec4<f32>) -> vec4<f32> {
-    return root * (root * value);
+// product with an HDR colour and its error does not. `zero` is 0, but only at run time: NVIDIA's compiler makes
+// (root * root) * value of it otherwise.
+fn squared_times(root: f32, value: vec4<f32>, zero: u32) -> vec4<f32> {
+    return root * bitcast<vec4<f32>>(bitcast<vec4<u32>>(root * value) ^ vec4(zero));
 }

@@ -23,7 +23,7 @@ fn depth_offset(depth: DepthRay, i: u32) -> vec4<f32> {
 
 fn depth_forward(depth: DepthRay, i: u32, root: f32, alpha: f32, zero: u32) -> DepthRay {
     var next = depth;
-    next.sum = sum_add(depth.sum, squared_times(root, alpha * depth_offset(depth, i)), zero);
+    next.sum = sum_add(depth.sum, squared_times(root, alpha * depth_offset(depth, i), zero), zero);
     return next;
 }
 

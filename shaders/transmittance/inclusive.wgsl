@@ -17,6 +17,6 @@ fn gradient_color(alpha: f32, color: vec4<f32>, behind: Sum) -> vec4<f32> {
 }
 
 // What the sample adds to the colour seen from in front of it: B_{i-1} = alpha * own_color + e^-tau * B_i.
-fn own_color(passing_root: f32, color: vec4<f32>) -> vec4<f32> {
-    return squared_times(passing_root, color);
+fn own_color(passing_root: f32, color: vec4<f32>, zero: u32) -> vec4<f32> {
+    return squared_times(passing_root, color, zero);
 }
