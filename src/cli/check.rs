@@ -24,7 +24,7 @@ pub(crate) struct Check {
     /// Where tensors live
     #[arg(long, value_parser = memories(), default_value = "auto")]
     pub(crate) memory: std::option::Option<TensorMemory>,
-    /// How the networks are multiplied: rows per thread, or shared weights
+    /// How the networks are multiplied: tiles of workgroups, rows per thread, or shared weights
     #[arg(long, value_parser = products(), default_value = "auto")]
     pub(crate) product: std::option::Option<Product>,
 }
@@ -50,13 +50,17 @@ fn memories() -> OneOf<Option<TensorMemory>> {
 }
 
 fn products() -> OneOf<Option<Product>> {
-    let product = |rows, shared_weights| Some(Product { rows, shared_weights });
     let values = [
         ("auto", AUTO, None),
-        ("shared", "Four rows per thread, and threads that read weights together", product(4, true)),
-        ("1", "One row per thread", product(1, false)),
-        ("2", "Two rows per thread", product(2, false)),
-        ("4", "Four rows per thread", product(4, false)),
+        (
+            "shared",
+            "Four rows per thread, and threads that read weights together",
+            Some(Product::SharedWeights),
+        ),
+        ("tiled", "Tiles of rows and weights that workgroups read together", Some(Product::Tiled)),
+        ("1", "One row per thread", Some(Product::Rows(1))),
+        ("2", "Two rows per thread", Some(Product::Rows(2))),
+        ("4", "Four rows per thread", Some(Product::Rows(4))),
     ];
     OneOf::new(values.map(|(name, help, product)| (name.to_owned(), help, product)))
 }

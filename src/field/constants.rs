@@ -61,7 +61,7 @@ impl Plan {
             ("MLP_QUADS", layout.quads),
             ("CHUNKS", self.chunks),
             ("GROUP_COLUMNS", GROUP_COLUMNS as usize),
-            ("SAMPLES_PER_THREAD", self.product.rows),
+            ("SAMPLES_PER_THREAD", self.product.rows()),
             ("CELLS", config.occupancy.cells as usize),
             ("CELL_COUNT", self.cell_count()),
             ("CASCADES", space.cascades()),

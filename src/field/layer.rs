@@ -1,39 +1,54 @@
-//! The matrix products of the networks, the one part of the kernels that is generated: software drivers are
-//! several times faster when a layer's inputs stay in registers, which takes one line per multiplication.
-//! Where the inputs come from and the outputs go is WGSL in `shaders/layer_…` and `shaders/common`.
+//! The matrix products of the networks, the one part of the kernels that is generated: where sums stay in registers, each
+//! multiplication takes a line. Where the inputs come from and the outputs go is WGSL in `shaders/layer_…` and
+//! `shaders/common`.
 //!
-//! Every product handles several samples per thread, since reading a weight costs as much as several
-//! multiplications. Rows behind the last are computed too; all buffers have room for them.
+//! On CPUs a thread has whole rows of inputs in registers, several of them, since reading a weight costs as much as
+//! several multiplications. On GPUs workgroups share tiles; see [`tiled_layer`]. Rows behind the last are computed too;
+//! all buffers have room for them.
 
+use super::generated::{COMPONENTS, group_size, line};
+use super::tiled_layer;
 use std::fmt::Write;
 
-/// Writes into a String, which cannot fail.
-macro_rules! line {
-    ($text:ident, $($format:tt)*) => {{
-        let _ = writeln!($text, $($format)*);
-    }};
-}
-
-/// How a thread multiplies.
+/// How the networks are multiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Product {
-    /// Rows per thread.
-    pub rows: usize,
-    /// Eight threads read eight weights together and pass them on, which software drivers with subgroups do
-    /// several times faster than each reading all.
-    pub shared_weights: bool,
+pub enum Product {
+    /// Each thread multiplies so many rows on its own.
+    Rows(usize),
+    /// Each thread multiplies four rows. Eight threads read eight weights together and pass them on, which software
+    /// drivers with subgroups do several times faster than each reading all.
+    SharedWeights,
+    /// Workgroups read tiles of rows and weights together.
+    Tiled,
 }
 
 /// Weights that threads read together.
 const SHARED: usize = 8;
 
 impl Product {
+    /// Rows per thread.
+    #[must_use]
+    pub fn rows(self) -> usize {
+        match self {
+            Self::Rows(rows) => rows,
+            Self::SharedWeights => 4,
+            Self::Tiled => 1,
+        }
+    }
+
     /// `layer_store(row, o, Σ_k W[o][k] x[k])`. The weights are `array<vec4<f32>, outputs / 4 * inputs>`, see
     /// [`crate::field::layout::Layer`].
     #[must_use]
     pub fn forward(self, inputs: usize, outputs: usize) -> String {
+        match self {
+            Self::Tiled => tiled_layer::forward(inputs, outputs),
+            _ => self.forward_rows(inputs, outputs),
+        }
+    }
+
+    fn forward_rows(self, inputs: usize, outputs: usize) -> String {
         let mut text = self.head("layer_load, layer_store", inputs * outputs / 4);
-        for row in 0..self.rows {
+        for row in 0..self.rows() {
             for quad in 0..inputs / 4 {
                 line!(text, "    let x{row}_{quad} = layer_load(first + {row}u, {quad}u);");
             }
@@ -44,12 +59,12 @@ impl Product {
             let start = input - input % SHARED;
             let together = format!("o * {inputs}u + {start}u + lane");
             self.weight(&mut text, input, &format!("o * {inputs}u + {input}u"), &together);
-            for row in 0..self.rows {
+            for row in 0..self.rows() {
                 let (quad, component) = (input / 4, COMPONENTS[input % 4]);
                 line!(text, "        sum{row} += w{input} * x{row}_{quad}.{component};");
             }
         }
-        for row in 0..self.rows {
+        for row in 0..self.rows() {
             line!(text, "        layer_store(first + {row}u, o, sum{row});");
         }
         text.push_str("    }\n}\n");
@@ -59,9 +74,16 @@ impl Product {
     /// `layer_d_store(row, k, Σ_o W[o][k] d[o])` for the first `wanted` inputs.
     #[must_use]
     pub fn backward(self, inputs: usize, wanted: usize, outputs: usize) -> String {
+        match self {
+            Self::Tiled => tiled_layer::backward(inputs, wanted, outputs),
+            _ => self.backward_rows(inputs, wanted, outputs),
+        }
+    }
+
+    fn backward_rows(self, inputs: usize, wanted: usize, outputs: usize) -> String {
         let mut text = self.head("layer_d_store, layer_gradient", inputs * outputs / 4);
         let quads = outputs / 4;
-        for row in 0..self.rows {
+        for row in 0..self.rows() {
             for quad in 0..quads {
                 line!(text, "    let d{row}_{quad} = layer_gradient(first + {row}u, {quad}u);");
             }
@@ -76,12 +98,12 @@ impl Product {
             let together = format!("4u * k + {first}u + lane % 4u + (lane / 4u) * {second}u");
             let own = format!("4u * k + {}u", quad * inputs + component);
             self.weight(&mut text, number, &own, &together);
-            for row in 0..self.rows {
+            for row in 0..self.rows() {
                 let name = COMPONENTS[component];
                 line!(text, "        sum{row}.{name} += dot(w{number}, d{row}_{quad});");
             }
         }
-        for row in 0..self.rows {
+        for row in 0..self.rows() {
             line!(text, "        layer_d_store(first + {row}u, k, sum{row});");
         }
         text.push_str("    }\n}\n");
@@ -90,7 +112,7 @@ impl Product {
 
     /// Reads weight number `number`: from index `own`, or out of the eight read from index `together`.
     fn weight(self, text: &mut String, number: usize, own: &str, together: &str) {
-        if !self.shared_weights {
+        if self != Self::SharedWeights {
             line!(text, "        let w{number} = layer_weights[{own}];");
             return;
         }
@@ -102,15 +124,15 @@ impl Product {
     }
 
     fn zero_sums(self, text: &mut String) {
-        for row in 0..self.rows {
+        for row in 0..self.rows() {
             line!(text, "        var sum{row} = vec4(0.0);");
         }
     }
 
     /// All threads of a workgroup go on or none: subgroups need all their members.
     fn head(self, needs: &str, weights: usize) -> String {
-        let rows = self.rows;
-        let (argument, lane) = if self.shared_weights {
+        let rows = self.rows();
+        let (argument, lane) = if self == Self::SharedWeights {
             (", @builtin(subgroup_invocation_id) invocation: u32", "    let lane = invocation % 8u;\n")
         } else {
             ("", "")
@@ -134,21 +156,27 @@ const TILE_OUTPUT_QUADS: usize = 4;
 const SHARED_INPUTS: usize = 4 * SHARED;
 
 impl Product {
-    /// `Σ_rows x[k] d[o]` over one chunk of rows, for a tile of inputs by `quads` quads of outputs. The sizes of
-    /// the layer are in the uniform `tile`, so that one pipeline serves all layers of as many outputs.
+    /// `Σ_rows x[k] d[o]` over one chunk of rows, for a tile of a layer of `inputs` and `outputs`. Where tiles do not
+    /// depend on the number of inputs, the text is the same for layers of as many outputs.
     #[must_use]
-    pub fn weight_gradient(self, quads: usize) -> String {
-        if self.shared_weights { shared_weight_gradient(quads) } else { own_weight_gradient(quads) }
+    pub fn weight_gradient(self, inputs: usize, outputs: usize) -> String {
+        match self {
+            Self::Rows(_) => own_weight_gradient(outputs / 4),
+            Self::SharedWeights => shared_weight_gradient(outputs / 4),
+            Self::Tiled => tiled_layer::weight_gradient(inputs, outputs),
+        }
     }
 
     /// Threads of a weight gradient over `chunks` chunks of rows.
     #[must_use]
-    pub fn weight_gradient_threads(self, inputs: usize, quads: usize, chunks: usize) -> usize {
-        if self.shared_weights {
-            inputs.div_ceil(SHARED_INPUTS) * SHARED * chunks
-        } else {
-            (inputs / TILE_INPUTS) * (quads / quads.min(TILE_OUTPUT_QUADS)) * chunks
-        }
+    pub fn weight_gradient_threads(self, inputs: usize, outputs: usize, chunks: usize) -> usize {
+        let quads = outputs / 4;
+        chunks
+            * match self {
+                Self::Rows(_) => (inputs / TILE_INPUTS) * (quads / quads.min(TILE_OUTPUT_QUADS)),
+                Self::SharedWeights => inputs.div_ceil(SHARED_INPUTS) * SHARED,
+                Self::Tiled => group_size(),
+            }
     }
 }
 
@@ -216,8 +244,6 @@ fn store_sums(text: &mut String, inputs: usize, quads: usize) {
     }
     text.push_str("}\n");
 }
-
-const COMPONENTS: [&str; 4] = ["x", "y", "z", "w"];
 
 const TILE_HEAD: &str = "\
 // needs: layer_count, tile

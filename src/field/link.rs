@@ -171,15 +171,6 @@ fn text(name: &str) -> Option<&'static str> {
     SHADERS.get_file(name).and_then(include_dir::File::contents_utf8)
 }
 
-/// Threads of a workgroup of every kernel over counts that the device knows: GROUP_SIZE of `shaders/common/group.wgsl`.
-#[must_use]
-pub fn group_size() -> usize {
-    let stated =
-        text("common/group.wgsl").and_then(|text| text.split_once("const GROUP_SIZE = ")?.1.split_once("u;"));
-    let size = stated.and_then(|(size, _)| size.parse().ok());
-    size.unwrap_or_else(|| unreachable!("shaders/common/group.wgsl states GROUP_SIZE"))
-}
-
 /// What a shader needs, in its own words.
 pub fn needs(text: &str) -> impl Iterator<Item = &str> {
     let comment = text.lines().take_while(|line| line.starts_with("//"));

@@ -2,7 +2,7 @@
 
 use super::capacity::Rounds;
 use super::layout::Layout;
-use super::{Capabilities, Capacity, SceneFeatures, Space, layer};
+use super::{Capabilities, Capacity, SceneFeatures, Space, layer::Product};
 use crate::camera::LensKind;
 use crate::config::{Accumulation, ColorLoss, Config};
 use crate::gpu::Gpu;
@@ -28,7 +28,7 @@ pub struct Plan {
     /// What there is room for.
     pub capacity: Capacity,
     /// How matrix products are written.
-    pub product: layer::Product,
+    pub product: Product,
     /// How the table's gradients are summed.
     pub accumulation: Accumulation,
     /// Where tensors live.
@@ -67,10 +67,12 @@ impl Plan {
             Accumulation::Auto => Accumulation::Exchange,
             chosen => chosen,
         };
-        let shared_weights = adapter.is_cpu && adapter.subgroups_of_8;
-        let rows = if adapter.is_cpu { 4 } else { 2 };
+        let product = match adapter {
+            Capabilities { is_cpu: false, .. } => Product::Tiled,
+            Capabilities { subgroups_of_8: true, .. } => Product::SharedWeights,
+            _ => Product::Rows(4),
+        };
         let chunks = if adapter.is_cpu { 32 } else { 512 };
-        let product = layer::Product { rows, shared_weights };
         let rounds = Rounds::suited_to(adapter);
         let memory = adapter.memory;
         Self { config, layout, features, space, capacity, product, accumulation, memory, chunks, rounds }

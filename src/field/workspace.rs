@@ -1,7 +1,7 @@
 //! Buffers and tensors by name.
 
 use super::Plan;
-use super::link::group_size;
+use super::generated::group_size;
 use super::parameters::{Array, Numbers};
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;

@@ -25,7 +25,7 @@ pub(crate) fn modest_adapter() -> Result<CheckedAdapter> {
     let forced = Forced {
         accumulation: Some(Accumulation::Exchange),
         memory: Some(TensorMemory::Buffers),
-        product: Some(Product { rows: 2, shared_weights: false }),
+        product: Some(Product::Tiled),
     };
     CheckedAdapter::new(&Arc::new(gpu), forced)
 }

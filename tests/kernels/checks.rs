@@ -162,11 +162,13 @@ fn every_accumulation() -> Result<()> {
 /// The checks whose kernels a product changes.
 #[test]
 fn every_product() -> Result<()> {
-    for (rows, shared_weights) in [(1, false), (2, false), (4, false), (4, true)] {
-        let forced = Forced { product: Some(Product { rows, shared_weights }), ..Forced::default() };
+    for product in
+        [Product::Rows(1), Product::Rows(2), Product::Rows(4), Product::SharedWeights, Product::Tiled]
+    {
+        let forced = Forced { product: Some(product), ..Forced::default() };
         let adapter = match adapter_with(forced) {
             Ok(adapter) => adapter,
-            Err(error) if shared_weights => {
+            Err(error) if product == Product::SharedWeights => {
                 println!("left out: {error:#}");
                 continue;
             }
@@ -175,6 +177,25 @@ fn every_product() -> Result<()> {
         println!("{}", adapter.describe()?);
         passes(networks(&adapter, SMALL)?);
     }
+    Ok(())
+}
+
+/// Tiles whose sides are no powers of two, or that fill the memory of a workgroup, and whole steps and views.
+#[test]
+fn tiles_of_every_shape() -> Result<()> {
+    let adapter = adapter_with(Forced { product: Some(Product::Tiled), ..Forced::default() })?;
+    let shape = |levels, width, color_layers| FieldShape {
+        levels,
+        width,
+        color_layers,
+        hdr: false,
+        saturated: false,
+    };
+    passes(networks(&adapter, &SHAPES)?);
+    passes(networks(&adapter, &[shape(24, 48, 2), shape(8, 112, 1), shape(16, 128, 3)])?);
+    let setups = step::setups();
+    passes([step::one_step(&adapter, &[setups[0].clone(), setups[4].clone()])?]);
+    passes(rendered_view::rendered_views(&adapter)?);
     Ok(())
 }
 

@@ -48,7 +48,7 @@ fn plan(memory: TensorMemory, cascades: u32) -> Plan {
     config.grid.finest = 2048;
     let features = SceneFeatures { alpha: true, ..SceneFeatures::default() };
     let bounds = Bounds { center: DVec3::ZERO, half: 1.0, cascades, source: String::new(), is_guess: false };
-    let product = Product { rows: 2, shared_weights: false };
+    let product = Product::Rows(2);
     let adapter = Capabilities { memory, ..Capabilities::GPU };
     Plan {
         product,
@@ -220,8 +220,7 @@ fn every_combination_links() {
             println!("{memory:?} {file}: {count}");
             assert!(count > 0, "{file} does not link");
         }
-        for (width, shared_weights) in [(16, false), (64, true)] {
-            let product = Product { rows: 2, shared_weights };
+        for (width, product) in [(16, Product::Rows(2)), (64, Product::SharedWeights), (48, Product::Tiled)] {
             for (name, main) in
                 [("forward", product.forward(width, 16)), ("backward", product.backward(width, width, 16))]
             {
@@ -243,8 +242,15 @@ fn every_combination_links() {
                 }
             }
         }
-        for (quads, shared_weights) in [(1, false), (4, false), (1, true), (16, true)] {
-            let main = Product { rows: 2, shared_weights }.weight_gradient(quads);
+        let products = [
+            (4, Product::Rows(2)),
+            (16, Product::Rows(2)),
+            (4, Product::SharedWeights),
+            (64, Product::SharedWeights),
+            (48, Product::Tiled),
+        ];
+        for (outputs, product) in products {
+            let main = product.weight_gradient(16, outputs);
             let kernel = Link::of_text("weight gradient", main.clone());
             assert!(linker.link_all(&kernel, &main, &[("counted", "read")]) > 0);
         }

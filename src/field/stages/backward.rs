@@ -98,13 +98,14 @@ pub fn weights(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stag
         let d_output = if number == last { "d_raw_color" } else { D_COLOR_HIDDEN[number] };
         jobs.push((shape, input, d_output, false));
     }
-    let mut kernels: Vec<(usize, Kernel)> = Vec::new();
+    let mut kernels: Vec<(String, Kernel)> = Vec::new();
     let mut stages = Vec::new();
     for (shape, input, d_output, of_samples) in jobs {
-        if kernels.iter().all(|(outputs, _)| *outputs != shape.outputs) {
-            kernels.push((shape.outputs, weight_kernel(gpu, plan, shape.outputs)?));
+        let text = plan.product.weight_gradient(shape.inputs, shape.outputs);
+        if kernels.iter().all(|(known, _)| *known != text) {
+            kernels.push((text.clone(), weight_kernel(gpu, plan, shape, &text)?));
         }
-        for (_, kernel) in kernels.iter().filter(|(outputs, _)| *outputs == shape.outputs) {
+        for (_, kernel) in kernels.iter().filter(|(known, _)| *known == text) {
             let tile = Tile {
                 input_quads: (shape.inputs / 4) as u32,
                 first_quad: shape.first_quad as u32,
@@ -114,15 +115,15 @@ pub fn weights(gpu: &Gpu, plan: &Plan, workspace: &Workspace) -> Result<Vec<Stag
             let uniform = gpu.uniform("tile", &tile)?;
             let renamed = [("layer_input", input), ("d_output", d_output)];
             let bound = workspace.bind_with(gpu, kernel, &renamed, &[uniform.resource()])?;
-            let threads = plan.product.weight_gradient_threads(shape.inputs, shape.outputs / 4, plan.chunks);
+            let threads = plan.product.weight_gradient_threads(shape.inputs, shape.outputs, plan.chunks);
             stages.push(Stage::over(bound, threads));
         }
     }
     Ok(stages)
 }
 
-/// The kernel for the weights of layers of `outputs` outputs.
-fn weight_kernel(gpu: &Gpu, plan: &Plan, outputs: usize) -> Result<Kernel> {
-    let link = Link::of_text(&format!("d weights {outputs}"), plan.product.weight_gradient(outputs / 4));
+/// The kernel for the weights of layers of this shape.
+fn weight_kernel(gpu: &Gpu, plan: &Plan, shape: &Layer, text: &str) -> Result<Kernel> {
+    let link = Link::of_text(&format!("d weights {}", shape.outputs), text.to_owned());
     plan.kernel(gpu, &link.with("layer_count", "kept"))
 }

@@ -44,9 +44,9 @@ impl CheckedAdapter {
              have them; leave it out, or ask for buffers"
         );
         ensure!(
-            forced.product.is_none_or(|product| !product.shared_weights) || gpu.has_subgroups_of(8),
+            forced.product != Some(Product::SharedWeights) || gpu.has_subgroups_of(8),
             "shared weights need subgroups of a multiple of 8 threads, and those of the adapter '{name}' have {}; \
-             leave it out, or ask for 1, 2 or 4 rows",
+             leave it out, or ask for tiled, or for 1, 2 or 4 rows",
             gpu.info.subgroup_min_size
         );
         Ok(Self { gpu: Arc::clone(gpu), forced })
@@ -80,14 +80,15 @@ impl CheckedAdapter {
             TensorMemory::Textures => "tensors in textures",
         };
         let rows = match product {
-            Product { shared_weights: true, rows } => format!("{rows} rows and shared weights"),
-            Product { rows: 1, .. } => "1 row".into(),
-            Product { rows, .. } => format!("{rows} rows"),
+            Product::SharedWeights => "4 rows per thread and shared weights".into(),
+            Product::Tiled => "tiles per workgroup".into(),
+            Product::Rows(1) => "1 row per thread".into(),
+            Product::Rows(rows) => format!("{rows} rows per thread"),
         };
         let parts = [
             (accumulation_name(accumulation).to_owned(), self.forced.accumulation.is_some()),
             (memory.to_owned(), self.forced.memory.is_some()),
-            (format!("matrix products of {rows} per thread"), self.forced.product.is_some()),
+            (format!("matrix products of {rows}"), self.forced.product.is_some()),
         ];
         let kind = if self.gpu.is_cpu() { "a CPU adapter" } else { "a GPU" };
         let why = match parts.iter().filter(|(_, is_forced)| *is_forced).count() {

@@ -4,7 +4,7 @@ use super::inputs::Random;
 use super::stress_rays::StressRay;
 use super::{CheckResult, CheckedAdapter, Setup, Workbench};
 use crate::config::Transmittance;
-use crate::field::link::group_size;
+use crate::field::generated::group_size;
 use crate::field::{Counters, composite};
 use crate::gpu::pass::Stage;
 use crate::verify::reference::composite::{CompositeInput, CompositeOutput};
