@@ -9,8 +9,9 @@
 set -euo pipefail
 
 most_mib=60
-# Unpacked, not installed: a bare machine may lack them.
-packages=(libvulkan1 libx11-6 libxext6 libxcb1 libxau6 libxdmcp6 libbsd0 libmd0)
+# Unpacked, not installed: a bare machine may lack them. NVIDIA's driver finds no device without libEGL and libGL.
+packages=(libvulkan1 libegl1 libgl1 libglx0 libglvnd0 libgles2 libopengl0
+    libx11-6 libxext6 libxcb1 libxau6 libxdmcp6 libbsd0 libmd0)
 
 if [ $# -ne 1 ]; then
     sed -n '5,8s/^# //p' "$0" >&2
