@@ -175,7 +175,7 @@ step() {
 }
 
 part_step() {
-    step step --warm "$warm" --seconds "$measured"
+    step step --warm "$warm" --seconds "$measured" --rounds 1 --rounds 2 --rounds 4
 }
 
 # sweep_SETTING_VALUE

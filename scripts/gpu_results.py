@@ -164,6 +164,12 @@ def step_section(result):
     if step["cold_start"]:
         start = step["cold_start"]
         lines.append(f"From a cold start, the first step ends after {start['seconds']:.2f} s; kernels take {start['kernels_seconds']:.2f} s of it.")
+    for views in step.get("views", []):
+        lines.append(
+            f"Views of {views['width']}x{views['height']} pixels, without files, {views['rays']} rays and {views['samples']} samples a round: "
+            f"{number(views['seconds'], 1, 1e3)} ms each, {number(views['device_seconds'], 1, 1e3)} of it on the device in "
+            f"{number(views['rounds'], 1)} rounds; the first one {number(views['first_seconds'], 1, 1e3)}."
+        )
     rows = []
     for stage in step["stages"]:
         work, ceiling = stage["work"] or {}, stage["ceiling"]

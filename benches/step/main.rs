@@ -67,6 +67,9 @@ struct Args {
     /// Views to render after it, as the training cameras see
     #[arg(long, default_value = "8")]
     views: usize,
+    /// How many times as much of a view is in work at once as the adapter gets; may be repeated
+    #[arg(long, value_name = "FACTOR", default_value = "1")]
+    rounds: Vec<usize>,
     /// The adapter: an index of `nerf adapters`, or parts of its name and backend [default: the first]
     #[arg(long)]
     adapter: Option<String>,
@@ -151,7 +154,8 @@ struct Measured {
     #[serde(rename = "cold_start")]
     start: Option<Start>,
     throughput: Throughput,
-    views: Views,
+    /// One for each room of a round.
+    views: Vec<Views>,
     /// Empty where the adapter has no timestamps.
     stages: Vec<StageTime>,
 }
@@ -191,7 +195,9 @@ fn main() -> Result<()> {
     // Should what follows hang, the throughput is known.
     save(&args, &result(&args, &run, &measured))?;
     say("rendering views");
-    measured.views = Views::measure(run.trainer.field(), &run.cameras, args.views)?;
+    for &factor in &args.rounds {
+        measured.views.push(Views::measure(run.trainer.field(), &run.cameras, factor, args.views)?);
+    }
     say("timing the stages");
     measured.stages = run.stages(&ceilings)?;
     let result = result(&args, &run, &measured);

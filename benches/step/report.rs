@@ -1,6 +1,6 @@
 //! What was measured, as JSON and as text.
 
-use super::{Args, Measured, Run, Throughput, stages};
+use super::{Args, Measured, Run, Throughput, Views, stages};
 use clap::ValueEnum;
 use serde_json::{Value, json};
 
@@ -61,7 +61,7 @@ pub(crate) fn table(result: &Value, measured: &Measured) -> String {
             .samples_per_second_of_two_cores
             .map(|rate| format!("samples/s  {rate:.0} kept, by CPU time on two cores")),
     );
-    lines.push(views.line());
+    lines.extend(views.iter().map(Views::line));
     if !stages.is_empty() {
         lines.extend(stages::table(stages));
     }
