@@ -7,7 +7,6 @@
 //! [`Trainer::on`](crate::field::trainer::Trainer::on) is a trainer on a dataset, an [`Evaluator`] compares rendered views
 //! with photos, and a [`TrainedField`] is a checkpoint to be rendered.
 
-mod border;
 mod clock;
 mod contents;
 pub mod depths;

@@ -1,21 +1,15 @@
 //! Test views rendered and compared with their photos.
 
-use super::border::{self, BorderWeight};
 use super::depths::{Depths, Onlookers, median_depth};
 use super::event::{Event, Observer, Warning};
 use super::scores::{Means, Score, Scores};
-use crate::camera::Bounds;
-use crate::capture::dataset::{Dataset, evenly_spaced};
+use crate::capture::dataset::Dataset;
 use crate::field::renderer::Renderer;
 use crate::photo::Photo;
 use crate::photo::color_space::{ColorSpace, photo_over};
 use crate::support::metrics::{filled, psnr_where, ssim};
 use anyhow::Result;
 use std::time::Instant;
-
-/// Views that are looked at for what lies at the border of the scene's box, and their longer side in pixels at most.
-const BORDER_VIEWS: usize = 6;
-const BORDER_SIDE: u32 = 32;
 
 /// Renders frames of a dataset and compares them with their photos.
 #[derive(Debug)]
@@ -125,25 +119,6 @@ impl<'a> Evaluator<'a> {
             })?;
             done += count;
         }
-    }
-
-    /// The part of what small views of a few training cameras show that lies at the border of the scene's box.
-    ///
-    /// # Errors
-    /// When the device was lost, or its interrupt was raised.
-    pub fn share_at_border(&mut self, bounds: &Bounds) -> Result<f64> {
-        let frames = evenly_spaced(&self.dataset.train, BORDER_VIEWS);
-        let cameras: Vec<_> = frames.iter().map(|&index| &self.dataset.frames[index].camera).collect();
-        let mut weight = BorderWeight::default();
-        if border::is_far(bounds, &cameras) {
-            return Ok(weight.share());
-        }
-        for camera in cameras {
-            let reduced = |side: u32| side.div_ceil(camera.width.max(camera.height).div_ceil(BORDER_SIDE));
-            let camera = camera.resized(reduced(camera.width), reduced(camera.height));
-            weight.add(&self.renderer.render(&camera)?, &camera, bounds);
-        }
-        Ok(weight.share())
     }
 
     /// Decodes the photos of some frames and keeps them for [`Evaluator::kept`]; those that masks ignore are left out.

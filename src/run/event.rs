@@ -7,7 +7,7 @@ use crate::field::Plan;
 use crate::field::checkpoint::Metadata;
 use crate::gpu::Gpu;
 use crate::photo::Photo;
-use crate::support::format::{bytes, count, few, percent};
+use crate::support::format::{bytes, count, few};
 use std::fmt;
 use std::path::Path;
 
@@ -171,13 +171,6 @@ pub enum Warning<'a> {
         /// The folder.
         folder: &'a Path,
     },
-    /// Much of what views show lies at the border of the scene's box, as what lies beyond it does.
-    AtBorder {
-        /// Steps taken.
-        step: u32,
-        /// The part of what they show, within `[0, 1]`.
-        share: f64,
-    },
     /// The rays of the last steps had no samples.
     Empty {
         /// Steps taken.
@@ -243,12 +236,6 @@ impl fmt::Display for Warning<'_> {
                     folder.display()
                 )
             }
-            Self::AtBorder { step, share } => write!(
-                f,
-                "at step {step}, {} of what the views show lies at the border of the scene box, where what lies beyond it \
-                 piles up; if that is more than sky, write a larger box (`aabb`, `aabb_scale`) into the file and train anew",
-                percent(*share)
-            ),
             Self::Empty { step } => write!(
                 f,
                 "at step {step} the rays meet nothing any more, the field has become empty; try a smaller \

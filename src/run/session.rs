@@ -4,7 +4,6 @@
 mod ending;
 mod saving;
 
-use super::border;
 use super::clock::StepClock;
 use super::disk;
 use super::evaluate::Evaluator;
@@ -30,8 +29,6 @@ pub use ending::NoTestViews;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The part of the budget after which surfaces have formed.
-const FORMED: f64 = 0.4;
 /// Test views that are measured while training.
 const FEW_VIEWS: usize = 4;
 
@@ -78,8 +75,6 @@ pub struct TrainingSession<'a> {
     loss: Option<[f64; 2]>,
     is_empty: bool,
     memory: MemoryUse,
-    /// Whether it is known how much lies at the border of the scene's box.
-    is_border_seen: bool,
 }
 
 /// How a session ended.
@@ -161,7 +156,6 @@ impl<'a> TrainingRun<'a> {
             loss: None,
             is_empty: false,
             memory,
-            is_border_seen: false,
         })
     }
 }
@@ -202,7 +196,6 @@ impl TrainingSession<'_> {
                 block.with_context(|| format!("at step {} ({})", self.stepper.steps(), self.kept()))?;
             self.record(block, observer)?;
             self.evaluate_if_due(observer)?;
-            self.look_at_border_if_due(observer)?;
             self.save_if_due(observer)?;
         }
         self.save_at_end(observer)?;
@@ -272,23 +265,5 @@ impl TrainingSession<'_> {
             ..log::Evaluation::default()
         };
         self.log(&LogRow::Evaluation(row), observer)
-    }
-
-    /// Warns, once and when there is time left to stop, where the scene's box is probably too small.
-    fn look_at_border_if_due(&mut self, observer: &mut dyn Observer) -> Result<()> {
-        let step = self.stepper.steps();
-        let Some(evaluator) = self.evaluator.as_mut().filter(|_| !self.is_border_seen) else { return Ok(()) };
-        if self.stepper.clock().spent(step) < FORMED {
-            return Ok(());
-        }
-        self.is_border_seen = true;
-        let share = match evaluator.share_at_border(&self.metadata.bounds) {
-            Err(error) if Interrupted::is_cause_of(&error) => return Ok(()),
-            share => share?,
-        };
-        if share > border::MUCH {
-            observer.notice(&Event::Warning(Warning::AtBorder { step, share }));
-        }
-        Ok(())
     }
 }
