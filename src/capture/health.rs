@@ -9,6 +9,7 @@ pub mod depth;
 pub mod gallery;
 pub mod map;
 mod optics;
+pub mod parallax;
 mod poses;
 mod roll;
 mod spread;

@@ -19,7 +19,7 @@ pub(super) enum Surroundings {
     Unknown,
 }
 
-const MAX_CASCADES: u32 = 8;
+pub(super) const MAX_CASCADES: u32 = 8;
 /// Surfaces around cameras that look outwards are no farther away than so many times the cameras from their middle, as a
 /// rule: people turn round within a metre, in rooms and in yards.
 const INSIDE: f64 = 120.0;

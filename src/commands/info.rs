@@ -15,6 +15,7 @@ use nerf::capture::health::Survey;
 use nerf::capture::health::depth::DepthSurvey;
 use nerf::capture::health::gallery::{Gallery, Look};
 use nerf::capture::health::map;
+use nerf::capture::health::parallax::ParallaxSurvey;
 use nerf::capture::unreadable::{Kind, Unreadable, kinds};
 use nerf::config::Config;
 use nerf::gpu::Gpu;
@@ -82,9 +83,11 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
     problems.extend(survey.findings.iter().cloned());
     let mut gallery = None;
     if !args.no_photos && problems::found(dataset) > 0 {
-        let (all, failures) = look(dataset, &survey.views, session)?;
+        let parallax = ParallaxSurvey::of(dataset, &dataset.train, &dataset.bounds);
+        let (all, failures) = look(dataset, &survey.views, &parallax, session)?;
         problems.extend(failures);
         gallery = Some(all);
+        problems.extend(parallax.finding());
     }
     problems.extend(survey.findings_with(gallery.as_ref(), dataset));
     let mut memory = None;
@@ -126,13 +129,21 @@ fn look_at_depth(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> D
 }
 
 /// Decodes all photos, in parallel, and keeps what matters of each, or why it cannot be trained on.
-fn look(dataset: &Dataset, views: &[usize], session: &Session<'_>) -> Result<(Gallery, Vec<Diagnostic>)> {
+fn look(
+    dataset: &Dataset,
+    views: &[usize],
+    parallax: &ParallaxSurvey,
+    session: &Session<'_>,
+) -> Result<(Gallery, Vec<Diagnostic>)> {
     let progress = Progress::new(session.console, "looking");
     let done = AtomicUsize::new(0);
     let looks: Result<Vec<_>> = (views.par_iter())
         .map(|&index| {
             session.check_interrupt()?;
-            let look = dataset.load(index, false).map(|photo| (index, Look::of(&photo)));
+            let look = dataset.load(index, false).map(|photo| {
+                parallax.look(index, &photo);
+                (index, Look::of(&photo))
+            });
             progress.count(1 + done.fetch_add(1, Ordering::Relaxed), views.len(), "photos");
             let unreadable = |error| Unreadable { name: dataset.frames[index].name.clone(), error };
             match look {

@@ -3,6 +3,7 @@
 use super::memory::{MemoryUse, Shortage};
 use super::scores::Means;
 use super::stepper::Block;
+use crate::capture::diagnostics::Diagnostic;
 use crate::field::Plan;
 use crate::field::checkpoint::Metadata;
 use crate::gpu::Gpu;
@@ -171,6 +172,11 @@ pub enum Warning<'a> {
         /// The folder.
         folder: &'a Path,
     },
+    /// Much of what the photos show seems to lie beyond the scene box.
+    BeyondBox {
+        /// How much, and what to do.
+        finding: &'a Diagnostic,
+    },
     /// The rays of the last steps had no samples.
     Empty {
         /// Steps taken.
@@ -236,6 +242,7 @@ impl fmt::Display for Warning<'_> {
                     folder.display()
                 )
             }
+            Self::BeyondBox { finding } => finding.fmt(f),
             Self::Empty { step } => write!(
                 f,
                 "at step {step} the rays meet nothing any more, the field has become empty; try a smaller \

@@ -16,6 +16,7 @@ use super::options::{EvaluationOptions, SavingOptions};
 use super::resolve::Resolved;
 use super::stepper::{Block, Stepper};
 use crate::capture::dataset::Dataset;
+use crate::capture::health::parallax::ParallaxSurvey;
 use crate::config::schedule::Budget;
 use crate::field::Field;
 use crate::field::checkpoint::Metadata;
@@ -27,6 +28,7 @@ use crate::support::temporary::remove_leftovers;
 use anyhow::{Context, Result};
 pub use ending::NoTestViews;
 use std::sync::Arc;
+use std::thread;
 use std::time::Instant;
 
 /// Test views that are measured while training.
@@ -112,7 +114,11 @@ impl<'a> TrainingRun<'a> {
         // Those that stay, and one that is being written.
         disk::check(&home, plan.state_bytes(), saving.keep as u64 + 1, observer)?;
         let clock = Instant::now();
-        let views = resolved.photos(dataset).load(&gpu, &resolved.plan, observer)?;
+        let parallax = ParallaxSurvey::of(dataset, &resolved.train, &resolved.metadata.bounds);
+        let look = |frame, photo: &_| parallax.look(frame, photo);
+        let views = resolved.photos(dataset).load_beside(&gpu, &resolved.plan, &look, observer)?;
+        // Beside the kernels, of which building takes about as long.
+        let parallax = thread::spawn(move || parallax.finding());
         let load_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let mut trainer = Trainer::new(Field::new(&gpu, resolved.plan.clone())?, views)?;
@@ -126,6 +132,9 @@ impl<'a> TrainingRun<'a> {
         let state = resolved.state.take();
         state.as_ref().map_or(Ok(()), |state| trainer.restore(state))?;
         let compile_seconds = clock.elapsed().as_secs_f64();
+        if let Ok(Some(finding)) = parallax.join() {
+            observer.notice(&Event::Warning(Warning::BeyondBox { finding: &finding }));
+        }
         let Resolved { metadata, plan, test, .. } = resolved;
         folder.make_again(&metadata.config)?;
         let mut log = folder.begin(&metadata.config, state.map(|state| state.step))?;

@@ -10,6 +10,7 @@ use crate::field::trainer::Trainer;
 use crate::field::training_views::TrainingViews;
 use crate::field::{Field, Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
+use crate::photo::Photo;
 use anyhow::{Result, ensure};
 use std::sync::Arc;
 
@@ -56,6 +57,20 @@ impl<'a> TrainingPhotos<'a> {
     /// When a file cannot be read, the device cannot hold the photos or its interrupt was raised, or they are not as the
     /// plan expects.
     pub fn load(&self, gpu: &Arc<Gpu>, plan: &Plan, observer: &mut dyn Observer) -> Result<TrainingViews> {
+        self.load_beside(gpu, plan, &|_, _| {}, observer)
+    }
+
+    /// The same, with a `look` at each photo and the index of its frame.
+    ///
+    /// # Errors
+    /// As [`TrainingPhotos::load`].
+    pub fn load_beside(
+        &self,
+        gpu: &Arc<Gpu>,
+        plan: &Plan,
+        look: &dyn Fn(usize, &Photo),
+        observer: &mut dyn Observer,
+    ) -> Result<TrainingViews> {
         let (dataset, frames) = (self.dataset, self.frames);
         let mut views = TrainingViews::new(gpu, plan, &self.cameras())?;
         let mut ignored = Vec::new();
@@ -68,6 +83,7 @@ impl<'a> TrainingPhotos<'a> {
                 ignored.push(dataset.frames[frames[position]].name.as_str());
             }
             gpu.interrupt.check()?;
+            look(frames[position], &photo);
             depths.add(&photo);
             views.add(&photo)?;
             observer.notice(&Event::Loading { done: position + 1, all: frames.len() });

@@ -3,6 +3,7 @@
 mod depth;
 mod files;
 mod masks;
+mod scene_box;
 mod toys;
 
 use crate::program::nerf;
@@ -44,7 +45,8 @@ fn a_healthy_dataset_is_told_in_full() {
 fn real_datasets_raise_no_false_alarm() {
     for (name, warnings) in [
         ("lego_100", &[][..]),
-        ("stitch_200", &[]),
+        // Its `aabb_scale` of 16 leaves out the background; 64 is better.
+        ("stitch_200", &["30 % of what the photos show seems to lie beyond the scene box"]),
         ("fox_270x480", &["17 of 67 listed images are missing"]),
         (
             "nerfstudio_lego_test",
