@@ -35,14 +35,16 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var distance = depth_begin(ray.depth);
     var spread = spread_begin();
     var sparsity = 0.0;
+    var next = seen_load(span.x);
     for (var i = span.x; i < end; i++) {
-        let kept = kept_step(i);
-        let gains = kept_gains(i);
+        let kept = next.step;
+        let gains = next.gains;
+        let own = vec4(next.color, 1.0);
+        next = seen_load(i + 1u);
         depth = sum_add(depth, vec4(kept.z), zero);
         let tau = optical_depth(kept.x, kept.y);
         let root = exp_accurate(-0.5 * transmittance_depth(depth.value.x, tau));
         let alpha = opacity(tau);
-        let own = vec4(color_load(i).rgb, 1.0);
         weight_store(i, root * (root * alpha));
         sums[0] = sum_add(sums[0], squared_times(root, gains.x * alpha * own, zero), zero);
         sums[1] = sum_add(sums[1], squared_times(root, gains.y * alpha * own, zero), zero);
@@ -70,12 +72,16 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let last_behind = sum_of(exp_accurate(-tail) * background);
     var behind = array(last_behind, last_behind);
     var missing = vec2(opacity(tail));
+    next = seen_load(max(end, 1u) - 1u);
+    var next_known = d_color_load(max(end, 1u) - 1u);
     for (var i = end; i > span.x; i--) {
-        let known = d_color_load(i - 1u);
-        let gains = kept_gains(i - 1u);
+        let known = next_known;
+        let gains = next.gains;
         let gain = 0.5 * (gains.x + gains.y);
-        let part = passage(known.x, kept_step(i - 1u).z, gain);
-        let color = vec4(color_load(i - 1u).rgb, 1.0);
+        let part = passage(known.x, next.step.z, gain);
+        let color = vec4(next.color, 1.0);
+        next = seen_load(max(i, 2u) - 2u);
+        next_known = d_color_load(max(i, 2u) - 2u);
         let alpha = part.alpha;
         let first = dot(d_results[0], gradient_color(alpha, color, behind[0]) - missing.x * color);
         let second = dot(d_results[1], gradient_color(alpha, color, behind[1]) - missing.y * color);
@@ -94,6 +100,17 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         behind = array(behind_next(behind[0], color, parts[0], zero), behind_next(behind[1], color, parts[1], zero));
         missing = vec2(missing_next(missing.x, parts[0]), missing_next(missing.y, parts[1]));
     }
+}
+
+// What is read of a kept sample: the next one's while this one is worked on.
+struct Seen {
+    step: vec4<f32>,
+    gains: vec2<f32>,
+    color: vec3<f32>,
+}
+
+fn seen_load(i: u32) -> Seen {
+    return Seen(kept_step(i), kept_gains(i), color_load(i).rgb);
 }
 
 // What a kept sample and those left out in front of it do to what is seen through them.

@@ -102,9 +102,14 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var transmittance = 1.0;
     let nobody = Member(0u, 1.0, 0.0, 0.0);
     var walk = Walk(span.x, 0.0, vec2(0.0), 0.0, nobody, nobody);
+    // The next sample is on its way while this one is weighed.
+    var next_sample = samples_load(span.x);
+    var next_raw = density_out_load(span.x * DENSITY_QUADS).x;
     for (var i = span.x; i < span.x + span.y; i++) {
-        let sample = samples_load(i);
-        let log_density = density_log(density_out_load(i * DENSITY_QUADS).x);
+        let sample = next_sample;
+        let log_density = density_log(next_raw);
+        next_sample = samples_load(i + 1u);
+        next_raw = density_out_load((i + 1u) * DENSITY_QUADS).x;
         let tau = optical_depth(log_density, sample.w);
         let member = Member(i, transmittance * opacity(tau), depth, tau);
         // Where rays go, the occupancy grid costs no samples of its own.
