@@ -32,6 +32,12 @@ fn advice(remedy: &Remedy) -> String {
             "use --downscale {downscale}, or --max-images or --crop to leave {percent} % of the pixels"
         ),
         Remedy::SmallerField => remedy.to_string(),
+        Remedy::RelieveDevice => {
+            "try again, a training with --resume; should it happen again, close what else uses the \
+             adapter, train with less (--downscale 2, --max-images N, a smaller --set batch.kept=N or \
+             grid.log2_table=N), or choose another --adapter"
+                .to_owned()
+        }
         Remedy::OrOvercommit(less) => {
             format!("{}, or add --overcommit to train all the same", advice(less))
         }

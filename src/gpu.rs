@@ -13,11 +13,13 @@ pub mod source;
 pub mod tensor;
 pub mod timer;
 
+use crate::support::format;
 use crate::support::interrupt::Interrupt;
+use crate::support::remedy::{Advised, Remedy};
 use crate::support::transient::Transient;
 use anyhow::{Context, Result, bail};
 use std::fmt::Display;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// An open device and what it can do.
 #[derive(Debug)]
@@ -36,9 +38,18 @@ pub struct Gpu {
 /// What a device reported outside of a call that could return it.
 #[derive(Clone, Debug)]
 struct DeviceError {
+    cause: Cause,
     message: String,
-    /// Whether it may work another time.
-    is_transient: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cause {
+    /// A mistake in the program or in the driver.
+    Invalid,
+    /// Its memory was full.
+    Full,
+    /// It was lost.
+    Lost,
 }
 
 /// Features that speed training up and are used wherever the adapter has them.
@@ -69,7 +80,10 @@ impl Gpu {
     pub fn open(adapter: &wgpu::Adapter) -> Result<Self> {
         let opened = Self::open_with(adapter, WANTED_FEATURES, adapter.limits());
         // It has what is asked for: it is busy, or its memory is full.
-        opened.map_err(|failure| Transient::new(format!("{failure:#}")).into())
+        opened.map_err(|failure| {
+            let name = adapter.get_info().name;
+            busy(&format!("the adapter '{name}' cannot be opened"), failure.root_cause())
+        })
     }
 
     /// Opens `adapter` with these limits and those of `features` that it has.
@@ -99,20 +113,22 @@ impl Gpu {
     #[must_use]
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
         let error = Arc::new(Mutex::new(None));
-        let report = |message: String, is_transient: bool, sink: &Mutex<Option<DeviceError>>| {
-            if let Ok(mut first) = sink.lock() {
-                first.get_or_insert(DeviceError { message, is_transient });
+        // The first is told, but that it was lost may come behind what follows from it.
+        let report = |cause: Cause, message: String, sink: &Mutex<Option<DeviceError>>| {
+            let mut told = sink.lock().unwrap_or_else(PoisonError::into_inner);
+            let is_first =
+                told.as_ref().is_none_or(|told| cause == Cause::Lost && told.cause == Cause::Invalid);
+            if is_first {
+                *told = Some(DeviceError { cause, message });
             }
         };
         let sink = Arc::clone(&error);
         device.on_uncaptured_error(Arc::new(move |failure: wgpu::Error| {
-            let is_transient = matches!(failure, wgpu::Error::OutOfMemory { .. });
-            report(failure.to_string(), is_transient, &sink);
+            let is_full = matches!(failure, wgpu::Error::OutOfMemory { .. });
+            report(if is_full { Cause::Full } else { Cause::Invalid }, failure.to_string(), &sink);
         }));
         let sink = Arc::clone(&error);
-        device.set_device_lost_callback(move |_, message| {
-            report(format!("the device was lost ({message})"), true, &sink);
-        });
+        device.set_device_lost_callback(move |_, message| report(Cause::Lost, message, &sink));
         Self { device, queue, info, interrupt: Interrupt::default(), error }
     }
 
@@ -173,17 +189,43 @@ impl Gpu {
     /// # Errors
     /// That error, with the adapter's name; [`Transient`] where the device was lost, or its memory was full.
     pub fn check(&self) -> Result<()> {
-        let first = self.error.lock().map_or(None, |slot| slot.clone());
-        let Some(DeviceError { message, is_transient }) = first else { return Ok(()) };
-        let message = format!("the adapter '{}' reported: {message}", self.info.name);
-        if is_transient {
-            return Err(Transient::new(message).into());
+        let told = self.error.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let Some(DeviceError { cause, message }) = told else { return Ok(()) };
+        match cause {
+            Cause::Invalid => bail!("the adapter '{}' reported: {message}", self.info.name),
+            Cause::Full => Err(self.full(message)),
+            Cause::Lost => Err(self.lost(message)),
         }
-        bail!(message)
+    }
+
+    /// What `make` allocates on the device.
+    ///
+    /// # Errors
+    /// When its memory is full: says for what.
+    fn allocated<T>(&self, what: &str, bytes: u64, make: impl FnOnce() -> T) -> Result<T> {
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let made = make();
+        match pollster::block_on(scope.pop()) {
+            Some(_) => {
+                Err(self.full(format!("there is no room for the {} of '{what}'", format::bytes(bytes))))
+            }
+            None => Ok(made),
+        }
+    }
+
+    /// The error for a device whose memory is full.
+    fn full(&self, failure: impl Display) -> anyhow::Error {
+        busy(&format!("the memory of the adapter '{}' is full", self.info.name), failure)
     }
 
     /// The error for a device that does not answer any more.
     fn lost(&self, failure: impl Display) -> anyhow::Error {
-        Transient::new(format!("the adapter '{}' does not answer any more: {failure}", self.info.name)).into()
+        busy(&format!("the adapter '{}' was lost", self.info.name), failure)
     }
+}
+
+/// The error for a device that may do another time what it does not do now.
+fn busy(what: &str, failure: impl Display) -> anyhow::Error {
+    let advised = Advised::new(format!("{what}; "), Remedy::RelieveDevice, "");
+    anyhow::Error::from(Transient::new(format!("{failure:#}"))).context(advised)
 }

@@ -158,8 +158,10 @@ impl Renderer {
             begin.elapsed()
         };
         let bytes = (band * size_of::<viewing::Pixel>()) as u64;
-        staging.take_if(|staging| staging.size() < bytes);
-        let staging = staging.get_or_insert_with(|| gpu.staging::<viewing::Pixel>(band));
+        let staging = match staging.take().filter(|staging| staging.size() >= bytes) {
+            Some(enough) => staging.insert(enough),
+            None => staging.insert(gpu.staging::<viewing::Pixel>(band)?),
+        };
         gpu.read_through(staging, workspace.get("view_pixels"), 0..band, add)
     }
 

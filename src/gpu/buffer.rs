@@ -19,7 +19,7 @@ impl Gpu {
     /// A zeroed storage buffer of `count` elements of `T`.
     ///
     /// # Errors
-    /// When it is larger than the adapter can bind; the message says both sizes.
+    /// When it is larger than the adapter can bind, in which case the message says both sizes, or its memory is full.
     pub fn storage<T>(&self, name: &'static str, count: usize) -> Result<Buffer> {
         self.buffer(name, (count * size_of::<T>()) as u64, Usage::STORAGE)
     }
@@ -58,12 +58,14 @@ impl Gpu {
 
     pub(super) fn buffer(&self, name: &'static str, bytes: u64, usage: Usage) -> Result<Buffer> {
         self.check_buffer(name, bytes)?;
-        let raw = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(name),
-            size: bytes.max(16).next_multiple_of(16),
-            usage: usage | Usage::COPY_DST | Usage::COPY_SRC,
-            mapped_at_creation: false,
-        });
+        let raw = self.allocated(name, bytes, || {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(name),
+                size: bytes.max(16).next_multiple_of(16),
+                usage: usage | Usage::COPY_DST | Usage::COPY_SRC,
+                mapped_at_creation: false,
+            })
+        })?;
         Ok(Buffer { name, raw })
     }
 
@@ -76,20 +78,25 @@ impl Gpu {
     /// Reads `count` elements of `buffer` from element `first` on, waiting for the device.
     ///
     /// # Errors
-    /// When the device was lost.
+    /// When the device was lost, or its memory is full.
     pub fn read<T: Pod>(&self, buffer: &Buffer, first: usize, count: usize) -> Result<Vec<T>> {
-        let staging = self.staging::<T>(count);
+        let staging = self.staging::<T>(count)?;
         self.read_through(&staging, buffer, first..first + count, |elements: &[T]| elements.to_vec())
     }
 
     /// Memory that the host reads, with room for `count` elements of `T`.
-    #[must_use]
-    pub fn staging<T: Pod>(&self, count: usize) -> wgpu::Buffer {
-        self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("read back"),
-            size: staged_bytes::<T>(count).max(4),
-            usage: Usage::MAP_READ | Usage::COPY_DST,
-            mapped_at_creation: false,
+    ///
+    /// # Errors
+    /// When there is not as much.
+    pub fn staging<T: Pod>(&self, count: usize) -> Result<wgpu::Buffer> {
+        let (label, size) = ("read back", staged_bytes::<T>(count).max(4));
+        self.allocated(label, size, || {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage: Usage::MAP_READ | Usage::COPY_DST,
+                mapped_at_creation: false,
+            })
         })
     }
 

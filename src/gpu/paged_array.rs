@@ -7,7 +7,8 @@ use super::Gpu;
 use super::buffer::Buffer;
 use super::kernel::Resource;
 use super::tensor::TensorMemory;
-use anyhow::{Result, ensure};
+use crate::support::format;
+use anyhow::{Context, Result, ensure};
 use std::fmt::Write;
 
 /// Words per row.
@@ -152,23 +153,16 @@ impl PagedArray {
             gpu.info.name,
             capacity.bytes()
         );
-        let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let page = |index: usize| {
             let rows = rows.saturating_sub(index * capacity.page_rows).clamp(1, capacity.page_rows);
             match capacity.memory {
                 TensorMemory::Buffers => Ok(Page::Buffer(gpu.storage::<u32>(NAMES[index], rows * ROW)?)),
-                TensorMemory::Textures => Ok(texture(gpu, NAMES[index], rows)),
+                TensorMemory::Textures => texture(gpu, NAMES[index], rows),
             }
         };
         let pages: Result<Vec<_>> = (0..count).map(page).collect();
-        let failure = pollster::block_on(scope.pop());
-        ensure!(
-            failure.is_none(),
-            "the {name} need {} bytes on the device, more than the adapter '{}' has left",
-            bytes_of(rows),
-            gpu.info.name
-        );
-        Ok(Self { name, capacity, pages: pages?, staged: 0 })
+        let pages = pages.with_context(|| format!("the {name} need {}", format::bytes(bytes_of(rows))))?;
+        Ok(Self { name, capacity, pages, staged: 0 })
     }
 
     /// Bytes on the device.
@@ -233,8 +227,8 @@ impl Page {
     }
 }
 
-fn texture(gpu: &Gpu, name: &'static str, rows: usize) -> Page {
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+fn texture(gpu: &Gpu, name: &'static str, rows: usize) -> Result<Page> {
+    let descriptor = wgpu::TextureDescriptor {
         label: Some(name),
         size: wgpu::Extent3d {
             width: ROW as u32,
@@ -247,12 +241,13 @@ fn texture(gpu: &Gpu, name: &'static str, rows: usize) -> Page {
         format: wgpu::TextureFormat::R32Uint,
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
-    });
+    };
+    let texture = gpu.allocated(name, bytes_of(rows), || gpu.device.create_texture(&descriptor))?;
     let view = texture.create_view(&wgpu::TextureViewDescriptor {
         dimension: Some(wgpu::TextureViewDimension::D2Array),
         ..Default::default()
     });
-    Page::Texture(texture, view)
+    Ok(Page::Texture(texture, view))
 }
 
 /// Writes whole rows, layer by layer; the last row is filled up with zeros.

@@ -209,16 +209,18 @@ impl Gpu {
         self.check_texture(name, count)?;
         let rows = texture_rows(count);
         use wgpu::TextureUsages as Usage;
-        let texture = self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(name),
-            size: wgpu::Extent3d { width: WIDTH as u32, height: rows as u32, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: element.format(),
-            usage: Usage::TEXTURE_BINDING | Usage::STORAGE_BINDING | Usage::COPY_SRC | Usage::COPY_DST,
-            view_formats: &[],
-        });
+        let texture = self.allocated(name, (rows * WIDTH * element.bytes()) as u64, || {
+            self.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(name),
+                size: wgpu::Extent3d { width: WIDTH as u32, height: rows as u32, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: element.format(),
+                usage: Usage::TEXTURE_BINDING | Usage::STORAGE_BINDING | Usage::COPY_SRC | Usage::COPY_DST,
+                view_formats: &[],
+            })
+        })?;
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         Ok(TensorStorage::Texture(texture, view))
     }

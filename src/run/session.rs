@@ -204,7 +204,8 @@ impl TrainingSession<'_> {
             let block =
                 block.with_context(|| format!("at step {} ({})", self.stepper.steps(), self.kept()))?;
             self.record(block, observer)?;
-            self.evaluate_if_due(observer)?;
+            let evaluated = self.evaluate_if_due(observer);
+            self.saved_despite(evaluated, observer)?;
             self.save_if_due(observer)?;
         }
         self.save_at_end(observer)?;

@@ -22,6 +22,8 @@ pub enum Remedy {
     },
     /// A field or a batch that takes less.
     SmallerField,
+    /// A device that has more memory and time left for what is asked of it.
+    RelieveDevice,
     /// What takes less memory, or to begin although it seems not to suffice.
     OrOvercommit(Box<Self>),
     /// What width and height are divided by.
@@ -92,6 +94,10 @@ impl fmt::Display for Remedy {
             Self::SmallerField => {
                 f.write_str("use a smaller table or batch (see configs/cpu.json), or another machine")
             }
+            Self::RelieveDevice => f.write_str(
+                "try again, a training from its last checkpoint; should it happen again, close what else uses the adapter, \
+                 ask less of it (fewer or smaller photos, a smaller batch or table), or choose another one",
+            ),
             Self::OrOvercommit(less) => write!(f, "{less}, or begin all the same"),
             Self::Downscale(by) => write!(f, "a downscale of {by}"),
             Self::InvertMasks => f.write_str("try to invert them"),

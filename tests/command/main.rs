@@ -6,6 +6,7 @@ mod bench;
 mod check;
 mod checkpoints;
 mod cli;
+mod devices;
 mod endurance;
 mod info;
 mod program;

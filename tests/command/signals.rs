@@ -1,8 +1,6 @@
 //! Signals and exit codes: what a terminal, a script or a scheduler does to the program, and what it learns from it.
 
 use crate::program::{SMOKE, checkpoint, generated, place, text};
-use nerf::gpu::{Gpu, adapter};
-use nerf::support::transient::is_transient;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -237,12 +235,4 @@ fn full_disks_are_worth_another_try() {
     assert_eq!(code, Some(3), "{errors}");
     let (code, _, errors) = Running::nerf(&["info", text(&dataset.join("missing"))]).end();
     assert_eq!(code, Some(1), "{errors}");
-}
-
-#[test]
-fn a_lost_device_is_worth_another_try() {
-    let gpu = Gpu::open(&adapter::choose(None).expect("an adapter")).expect("it opens");
-    gpu.device.destroy();
-    let lost = gpu.wait().and_then(|()| gpu.check()).expect_err("it is gone");
-    assert!(is_transient(&lost), "{lost:#}");
 }

@@ -1,10 +1,11 @@
 //! What a device refuses.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use nerf::gpu::Gpu;
 use nerf::gpu::kernel::Kernel;
 use nerf::gpu::pass::Stage;
 use nerf::gpu::source::Source;
+use nerf::support::transient::is_transient;
 
 fn gpu() -> Result<Gpu> {
     Gpu::choose(std::env::var("NERF_ADAPTER").ok().as_deref())
@@ -49,4 +50,26 @@ fn an_interrupt_is_heard_between_kernels() -> Result<()> {
     assert!(nerf::support::interrupt::Interrupted::is_cause_of(&refusal), "{refusal:#}");
     assert_eq!(gpu.read::<u32>(&numbers, 0, 4)?, [1; 4]);
     Ok(())
+}
+
+/// An adapter of which nothing is left to allocate, if its driver tells how much is (lavapipe's old ones do not).
+#[test]
+fn a_full_memory_is_told_with_what_to_do() -> Result<()> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.memory_budget_thresholds.for_resource_creation = Some(0);
+    let instance = wgpu::Instance::new(descriptor);
+    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
+    let Some(adapter) = adapters.first() else { return Ok(()) };
+    let gpu = Gpu::open(adapter)?;
+    let Err(failure) = gpu.storage::<u32>("numbers", 1 << 20) else { return Ok(()) };
+    let expected = format!(
+        "the memory of the adapter '{}' is full; try again, a training from its last checkpoint; should it happen again, \
+         close what else uses the adapter, ask less of it (fewer or smaller photos, a smaller batch or table), or choose \
+         another one: there is no room for the 4.0 MiB of 'numbers'",
+        gpu.info.name
+    );
+    assert_eq!(format!("{failure:#}"), expected);
+    assert!(is_transient(&failure));
+    // The device is as it was.
+    gpu.check().context("it was told already")
 }

@@ -90,6 +90,14 @@ impl TrainingSession<'_> {
         Ok(())
     }
 
+    /// Saves where something besides the training failed; the failure says which checkpoint is kept.
+    pub(super) fn saved_despite(&mut self, outcome: Result<()>, observer: &mut dyn Observer) -> Result<()> {
+        let Err(failure) = outcome else { return Ok(()) };
+        // Where the device is lost that fails too, and the checkpoint before is kept.
+        let _ = self.save_if_removed(observer);
+        Err(failure.context(format!("at step {} ({})", self.stepper.steps(), self.kept())))
+    }
+
     /// Makes the folder again where it was removed, which is said; a checkpoint is due then.
     fn make_folder_again(&mut self, observer: &mut dyn Observer) -> Result<()> {
         if self.folder.make_again(&self.metadata.config)? {
