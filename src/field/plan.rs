@@ -35,6 +35,8 @@ pub struct Plan {
     pub memory: TensorMemory,
     /// Chunks of samples whose weight gradients are summed apart: what runs side by side.
     pub chunks: usize,
+    /// Threads that march a ray of a step together. A thread that marches a ray of a view knows how many samples it has.
+    pub march_lanes: usize,
     /// How much of a view is in work at once.
     pub rounds: Rounds,
 }
@@ -67,6 +69,8 @@ impl Plan {
             Accumulation::Auto => Accumulation::Exchange,
             chosen => chosen,
         };
+        // A GPU has more threads than a step has rays.
+        let march_lanes = if adapter.is_cpu { 1 } else { 4 };
         let product = match adapter {
             Capabilities { is_cpu: false, .. } => Product::Tiled,
             Capabilities { subgroups_of_8: true, .. } => Product::SharedWeights,
@@ -75,7 +79,19 @@ impl Plan {
         let chunks = if adapter.is_cpu { 32 } else { 512 };
         let rounds = Rounds::suited_to(adapter);
         let memory = adapter.memory;
-        Self { config, layout, features, space, capacity, product, accumulation, memory, chunks, rounds }
+        Self {
+            config,
+            layout,
+            features,
+            space,
+            capacity,
+            product,
+            accumulation,
+            memory,
+            chunks,
+            march_lanes,
+            rounds,
+        }
     }
 
     /// The plan of a renderer of the same field for cameras with `lenses`, whose room does not depend on the run's.

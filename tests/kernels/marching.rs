@@ -22,6 +22,32 @@ fn no_rays() -> Result<()> {
     Ok(())
 }
 
+/// Threads that share a ray mark the steps that one alone marks; only at the border of a cell one may begin where the other
+/// leaps.
+#[test]
+fn threads_share_a_ray() -> Result<()> {
+    for cascades in [1, 3] {
+        let spans = |lanes| -> Result<Vec<[u32; 2]>> {
+            let mut setup = Setup { march_lanes: Some(lanes), ..Setup::tiny().cascades(cascades) };
+            setup.config.batch.samples = 16384;
+            let marching = Marching::new(&adapter()?, setup)?;
+            let cells = marching.bench.plan.cell_count();
+            let words: Vec<u32> = (0..cells as u32 / 32).map(|word| word.wrapping_mul(0x9e37_79b9)).collect();
+            marching.run(&words, 250, true)?;
+            marching.bench.read("ray_spans", 250)
+        };
+        let alone = spans(1)?;
+        assert!(alone.iter().any(|[_, count]| *count > 20));
+        for lanes in [2, 4] {
+            let together = spans(lanes)?;
+            let counts =
+                alone.iter().zip(&together).map(|([_, alone], [_, together])| alone.abs_diff(*together));
+            assert!(counts.sum::<u32>() < 5, "{lanes} threads: {alone:?}, {together:?}");
+        }
+    }
+    Ok(())
+}
+
 /// More samples than fit: the leading rays that fit are used, nothing is written out of range.
 #[test]
 fn too_many_samples() -> Result<()> {

@@ -200,7 +200,7 @@ fn every_combination_links() {
         let capacity = PageCapacity::of(&wgpu::Limits::default(), memory);
         for file in link::entry_points() {
             // What single kernels know of their own.
-            let own = [("CAPACITY", 16), ("CAMERA_COUNT", 3), ("PARAMETER_QUADS", 8)];
+            let own = [("CAPACITY", 16), ("CAMERA_COUNT", 3), ("PARAMETER_QUADS", 8), ("MARCH_LANES", 4)];
             let kernel = Link::of_file(file, file).counts(&own).float("RATE", 1.0).float("L2", 0.1);
             let main = text(file);
             let count = match link::needs(&main).any(|needed| needed == "pixels") {

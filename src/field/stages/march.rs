@@ -67,6 +67,8 @@ pub fn stages_over(
     let jitter = if jitter { "on" } else { "off" };
     let over_rays = |label: &str| {
         let link = Link::of(label).with("jitter", jitter).with("extent", extent.variant());
+        let lanes = if extent == MarchExtent::Whole { plan.march_lanes } else { 1 };
+        let link = link.count("MARCH_LANES", lanes);
         let link = if extent == MarchExtent::Round { link.with("distance", "depth") } else { link };
         plan.stage(gpu, workspace, &link, dispatch::RAYS)
     };

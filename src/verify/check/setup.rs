@@ -24,6 +24,8 @@ pub struct Setup {
     pub product: Option<Product>,
     /// Where tensors live; `None` as the plan chooses.
     pub memory: Option<TensorMemory>,
+    /// Threads that march a ray together; `None` as the plan chooses.
+    pub march_lanes: Option<usize>,
 }
 
 impl Setup {
@@ -57,7 +59,7 @@ impl Setup {
             source: "unit cube".into(),
             is_guess: false,
         };
-        Self { config, features, bounds, product: None, memory: None }
+        Self { config, features, bounds, product: None, memory: None, march_lanes: None }
     }
 
     /// With hidden layers of `width`, `color_layers` of them in the colour network.
@@ -105,6 +107,7 @@ impl Setup {
         let mut plan = Plan::new(gpu, self.config.clone(), self.features.clone(), space);
         plan.product = self.product.unwrap_or(plan.product);
         plan.memory = self.memory.unwrap_or(plan.memory);
+        plan.march_lanes = self.march_lanes.unwrap_or(plan.march_lanes);
         Ok(plan)
     }
 }
