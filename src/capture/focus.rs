@@ -61,6 +61,12 @@ impl OpticalAxis {
     }
 }
 
+/// Mean of the directions of cameras that look one way, up to 20 degrees to each side, and do not pan.
+const ONE_WAY: f64 = 0.98;
+
+/// Cameras that move along their axes see at least this part of their way ahead.
+const PART_OF_WAY: f64 = 1.0 / 16.0;
+
 /// The point a set of cameras looks at.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Focus {
@@ -91,7 +97,7 @@ pub(crate) fn find(axes: &[OpticalAxis]) -> Focus {
     if let Some(crossing) = crossing(axes, mean, spread) {
         return crossing;
     }
-    if heading.length() > 0.9 {
+    if heading.length() > ONE_WAY {
         return ahead(axes, mean, heading.normalize());
     }
     let point = DVec3::from_array(std::array::from_fn(|i| median(axes.iter().map(|axis| axis.origin[i]))));
@@ -163,11 +169,12 @@ fn ahead(axes: &[OpticalAxis], mean: DVec3, heading: DVec3) -> Focus {
     }
     let away = |axis: &OpticalAxis| (across(heading) * (axis.origin - mean)).length();
     let reach = axes.iter().map(away).fold(0.0, f64::max);
+    let way = axes.iter().map(|axis| (axis.origin - mean).dot(heading).abs()).fold(0.0, f64::max);
     // Where the view of each camera reaches over all the others; a single camera has no such distance,
     // and its distance from the origin is the only length there is.
     let from_views = median(axes.iter().map(|axis| (2.0 * reach - axis.half_width) / axis.tan_half));
-    let lengths = [from_views, mean.length(), 1.0];
-    let single = reach <= 1e-9 * mean.length();
+    let lengths = [from_views.max(PART_OF_WAY * way), mean.length(), 1.0];
+    let single = reach.max(way) <= 1e-9 * mean.length();
     let usable = lengths.into_iter().skip(usize::from(single));
     let distance = { usable }.find(|&d| d > 0.0 && d.is_finite()).unwrap_or(1.0);
     Focus { point: mean + distance * heading, distance, kind: FocusKind::Ahead }

@@ -141,6 +141,8 @@ impl Bounds {
             FocusKind::Inside => {
                 (f64::max(INSIDE * distance, 0.5 * INSIDE * farthest), "far beyond them, which is a guess")
             }
+            // Cameras on their way see what lies ahead of it.
+            FocusKind::Ahead => (f64::max(5.0 * distance, 4.0 * farthest), "well beyond them"),
             _ => (f64::max(5.0 * distance, 2.0 * farthest), "well behind them"),
         };
         Self {
@@ -296,6 +298,24 @@ mod tests {
         let array: Vec<_> = (-3..=3).map(|i| looking(place(i), place(i) + DVec3::Y, 0.7)).collect();
         let (bounds, _) = choose(&array, None, Surroundings::Background);
         assert!(bounds.center.distance(DVec3::new(0.0, 116.4, 3.0)) < 0.1, "{bounds:?}");
+        // On the way along a corridor, which is not as narrow as rounding.
+        for wiggle in [0.0, 1e-13, 1e-3, 0.01] {
+            let place = |i: i32| DVec3::new(wiggle * f64::from(i % 2), 0.05 * f64::from(i), 0.0);
+            let dolly: Vec<_> = (-24..=24).map(|i| looking(place(i), place(i) + DVec3::Y, 1.2)).collect();
+            let (bounds, _) = choose(&dolly, None, Surroundings::Background);
+            assert!(bounds.is_guess && (4.0..20.0).contains(&bounds.outer_half()), "{wiggle}: {bounds:?}");
+        }
+        // A quarter of a pan shows as much of a room as all of it does.
+        for half_pan in [0.45, 0.8, 2.0] {
+            let out = |i: i32| {
+                let turn = half_pan * f64::from(i) / 20.0;
+                DVec3::new(turn.cos(), turn.sin(), 0.1)
+            };
+            let pan: Vec<_> = (-20..=20).map(|i| looking(0.25 * out(i), out(i), 1.2)).collect();
+            let (bounds, _) = choose(&pan, None, Surroundings::Background);
+            let spread = 0.25 * half_pan.min(1.0);
+            assert!(bounds.is_guess && bounds.outer_half() > 60.0 * 0.5 * spread, "{half_pan}: {bounds:?}");
+        }
         // A room seen from its middle, and a panorama from one point.
         for step in [0.5, 0.0] {
             let room: Vec<_> = ring(DVec3::ZERO, step, 1.0)

@@ -164,7 +164,7 @@ fn statement(bounds: &Bounds, needed: f64) -> [String; 2] {
 
 /// A number with as many decimals as `of` has for so many figures.
 fn figures(number: f64, of: f64, figures: u32) -> String {
-    let decimals = (f64::from(figures) - 1.0 - of.log10().floor()).clamp(0.0, 12.0) as usize;
+    let decimals = (f64::from(figures) - 1.0 - of.log10().floor()).clamp(0.0, 20.0) as usize;
     format!("{number:.decimals$}")
 }
 
