@@ -179,6 +179,9 @@ pub(crate) struct Eval {
     /// Write the renderings, over the background, as PNG to this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) save: Option<PathBuf>,
+    /// Replace renderings of another field or dataset in the folder to save to
+    #[arg(long, requires = "save")]
+    pub(crate) overwrite: bool,
     /// How photos are read.
     #[command(flatten)]
     pub(crate) reading: photo_flags::PhotoFlags,

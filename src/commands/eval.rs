@@ -1,6 +1,7 @@
 //! `nerf eval`: PSNR and SSIM against photos.
 
 mod pictures;
+mod save_folder;
 
 use super::{Session, open_to_compare, warn_of_differences};
 use crate::cli::Eval;
@@ -12,10 +13,12 @@ use nerf::capture::image_file::write_png_rgba8;
 use nerf::photo::Split;
 use nerf::photo::color_space::{ColorSpace, opaque_srgb8};
 use nerf::run::{Compared, Evaluator, Means, Score, TrainedField};
+use nerf::support::fingerprint::checksum;
 use nerf::support::format::{count, few};
 use nerf::support::lock::FolderLock;
+use save_folder::SaveFolder;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
     let field = session.load_field(&args.run)?;
@@ -29,20 +32,41 @@ pub(super) fn run(args: &Eval, session: &Session<'_>) -> Result<()> {
         args.dataset.display(),
         range(dataset.is_hdr)
     );
-    let _lock = args.save.as_deref().map(FolderLock::shared).transpose()?;
-    let pictures = match &args.save {
-        Some(folder) => pictures::paths(folder, &dataset, &indices)?,
-        None => Vec::new(),
-    };
+    let save =
+        args.save.as_deref().map(|folder| save_to(folder, args, &field, (&dataset, &indices))).transpose()?;
     let gpu = session.open_gpu()?;
     let lenses = LensKind::among(indices.iter().map(|&index| &dataset.frames[index].camera));
     let mut evaluator = Evaluator::new(field.renderer(&gpu, &lenses)?, field.color_space(), &dataset);
     evaluator.background = args.background.color();
     evaluator.samples = args.spp;
-    let scores = measure(evaluator, &indices, &pictures, session)?;
+    let files = save.as_ref().map_or(&[][..], |folder| &folder.files);
+    let scores = measure(evaluator, &indices, files, session)?;
     let means = Means::of(&scores).context("there was nothing to measure")?;
     session.console.fog(means.near_share);
     session.print(&report(args, &field, &scores, means), &describe(args, &scores, means, field.color_space()))
+}
+
+/// Takes a folder for renderings of some frames.
+fn save_to(
+    folder: &Path,
+    args: &Eval,
+    field: &TrainedField,
+    (dataset, indices): (&Dataset, &[usize]),
+) -> Result<SaveFolder> {
+    let lock = if args.overwrite { FolderLock::alone } else { FolderLock::shared };
+    let lock = lock(folder)?;
+    let files = pictures::paths(folder, dataset, indices)?;
+    let frames = dataset.frames.iter().map(|frame| format!("{} {:?}", frame.name, frame.camera));
+    let rendering = json!({
+        "checkpoint": field.path().display().to_string(),
+        "step": field.metadata().step,
+        "field": field.identity(),
+        "dataset": checksum(frames),
+        "background": args.background.name(),
+        "spp": args.spp,
+    });
+    let rendering = rendering.as_object().cloned().unwrap_or_default();
+    SaveFolder::take((folder, lock), files, rendering, args.overwrite)
 }
 
 fn measure(

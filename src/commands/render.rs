@@ -17,9 +17,9 @@ use nerf::camera::{Bounds, Camera, LensKind};
 use nerf::capture::dataset::{UsualView, read_cameras, with_extensions};
 use nerf::run::TrainedField;
 use nerf::support::file::{available_bytes, first_within};
+use nerf::support::fingerprint::checksum;
 use nerf::support::format::{bytes, count, plural};
 use serde_json::{Map, Value, json};
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 use writer::Writer;
 
@@ -100,9 +100,7 @@ fn rendering(args: &Render, field: &TrainedField, path: &[Job], depth_range: [f6
         set("depth_far", json!(depth_range[1]));
     }
     set("field", json!(field.identity()));
-    let mut hasher = DefaultHasher::new();
-    path.iter().for_each(|job| format!("{:?}", job.camera).hash(&mut hasher));
-    set("cameras", json!(format!("{:016x}", hasher.finish())));
+    set("cameras", json!(checksum(path.iter().map(|job| format!("{:?}", job.camera)))));
     let has = |format| args.format.contains(&format);
     let background = match args.background {
         PictureBackground::Transparent => json!("transparent"),

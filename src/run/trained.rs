@@ -7,9 +7,9 @@ use crate::field::parameters::Numbers;
 use crate::field::renderer::Renderer;
 use crate::gpu::Gpu;
 use crate::photo::color_space::ColorSpace;
+use crate::support::fingerprint::checksum;
 use anyhow::Result;
 use std::collections::BTreeSet;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -51,16 +51,15 @@ impl TrainedField {
     pub fn identity(&self) -> String {
         let Checkpoint { metadata: Metadata { config, bounds, features, .. }, state } =
             &self.opened.checkpoint;
-        let mut hasher = DefaultHasher::new();
-        format!("{config:?} {bounds:?} {features:?}").hash(&mut hasher);
-        for (name, numbers) in &state.arrays {
-            name.hash(&mut hasher);
-            match numbers {
-                Numbers::Floats(numbers) => hasher.write(bytemuck::cast_slice(numbers)),
-                Numbers::Words(numbers) => hasher.write(bytemuck::cast_slice(numbers)),
-            }
-        }
-        format!("{:016x}", hasher.finish())
+        let settings = format!("{config:?} {bounds:?} {features:?}");
+        let arrays = state.arrays.iter().flat_map(|(name, numbers)| {
+            let bytes = match numbers {
+                Numbers::Floats(numbers) => bytemuck::cast_slice(numbers),
+                Numbers::Words(numbers) => bytemuck::cast_slice(numbers),
+            };
+            [name.as_bytes(), bytes]
+        });
+        checksum([settings.as_bytes()].into_iter().chain(arrays))
     }
 
     /// The colour space of what it renders.

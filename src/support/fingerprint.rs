@@ -1,4 +1,4 @@
-//! Whether files are those that they were.
+//! Whether files and values are those that they were, on any machine and with any compiler.
 
 use crc32fast::Hasher;
 use std::fs::File;
@@ -30,9 +30,27 @@ pub fn fingerprint(path: &Path) -> Result<u32> {
     Ok(checksum.finalize())
 }
 
+/// A text that tells values apart: a checksum of their lengths and bytes, one after the other.
+#[must_use]
+pub fn checksum<T: AsRef<[u8]>>(values: impl IntoIterator<Item = T>) -> String {
+    let mut checksum = Hasher::new();
+    for value in values {
+        checksum.update(&(value.as_ref().len() as u64).to_le_bytes());
+        checksum.update(value.as_ref());
+    }
+    format!("{:08x}", checksum.finalize())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn checksums_are_those_of_every_machine() {
+        assert_eq!(checksum(["123456789"]), "85a458e8");
+        assert_ne!(checksum(["ab", "c"]), checksum(["a", "bc"]));
+        assert_eq!(checksum::<&str>([]), "00000000");
+    }
 
     #[test]
     fn lengths_and_bytes_count() {

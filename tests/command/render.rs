@@ -2,6 +2,7 @@
 
 use crate::program::{generated, nerf, object, place, quietly, text, train};
 use nerf::capture::image_file::read_exr_channel;
+use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 use serde_json::Value;
 use std::fs;
@@ -115,6 +116,30 @@ fn frames_of_two_renderings_do_not_mix() {
     quietly(&render(&FIELD, &out, &white)).assert().code(1).stderr(contains("background was"));
     object(&render(&other, &out, &["--orbit", "2", "--overwrite"]));
     assert_eq!(listed(&out), [0, 1], "no frame of the other field is left");
+}
+
+#[test]
+fn test_views_of_two_fields_do_not_mix() {
+    let (out, other) = (place("views"), trained("22"));
+    let saved = |run: &Path, further: &[&str]| {
+        let args = ["eval", text(run), text(&TOYS), "--save", text(&out)];
+        quietly(&[&args, further].concat()).assert()
+    };
+    saved(&FIELD, &[]).success();
+    saved(&FIELD, &["--split", "val"]).success();
+    let pictures = |split: &str| {
+        let entries = fs::read_dir(&out).expect("a folder").map(|entry| entry.expect("readable").file_name());
+        entries.filter(|name| text(Path::new(name)).starts_with(split)).count()
+    };
+    assert!(pictures("test_") > 0 && pictures("val_") > 0, "other views of the same field come beside them");
+    saved(&other, &[]).code(1).stderr(contains("another field").and(contains("--overwrite")));
+    saved(&FIELD, &["--downscale", "2"]).code(1).stderr(contains("photos read otherwise"));
+    saved(&FIELD, &["--background", "white"]).code(1).stderr(contains("another background"));
+    saved(&other, &["--overwrite"]).success();
+    assert_eq!(pictures("val_"), 0, "no rendering of the other field is left");
+    fs::remove_file(out.join("renderings.json")).expect("removable");
+    saved(&other, &[]).code(1).stderr(contains("test_0000.png would be replaced"));
+    quietly(&["eval", text(&FIELD), text(&TOYS), "--overwrite"]).assert().code(2);
 }
 
 #[test]

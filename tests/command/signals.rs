@@ -126,7 +126,7 @@ fn signals_while_measuring_and_rendering() {
     assert!(whole_files(&run).contains(&run.join("report.html")));
 
     let eval = ["eval", text(&run), text(&large), "--split", "train", "--save", text(&saved), "--quiet"];
-    let has_pictures = || std::fs::read_dir(&saved).is_ok_and(|files| files.count() > 1);
+    let has_pictures = || std::fs::read_dir(&saved).is_ok_and(|files| files.count() > 2);
     let running = Running::nerf(&eval).until(has_pictures);
     let ended = running.signal("INT").end();
     assert_eq!(ended, (Some(130), String::new(), "error: interrupted by SIGINT\n".to_owned()));
