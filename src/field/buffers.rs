@@ -11,6 +11,9 @@ use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::tensor::Element;
 use anyhow::{Result, anyhow};
 
+/// What a step leaves for the next one.
+const CARRIED: [&str; 3] = ["step", "counters", "dispatch"];
+
 impl Plan {
     /// Whether the adapter can train the field of this plan and render its views.
     ///
@@ -61,6 +64,12 @@ impl Plan {
     #[must_use]
     pub fn viewing_buffers(&self) -> Vec<BufferSpec> {
         [march::buffers(self), density::buffers(self), color::buffers(self), viewing::buffers(self)].concat()
+    }
+
+    /// Whether views may keep `spec` where the steps of this plan have theirs: it is as large there, and what one step
+    /// leaves there is not read by the next.
+    pub(super) fn lends(&self, spec: &BufferSpec) -> bool {
+        !CARRIED.contains(&spec.name) && self.step_buffers(0).iter().any(|own| own.holds(spec))
     }
 
     /// A tensor in the plan's memory.

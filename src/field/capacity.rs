@@ -56,7 +56,7 @@ impl Rounds {
         if adapter.is_cpu {
             Self { rays: 1 << 13, samples: 1 << 15, most_quota: 16, band: 1 << 20, color_weight: 1e-3 }
         } else {
-            Self { rays: 1 << 15, samples: 1 << 18, most_quota: 64, band: 1 << 22, color_weight: 1e-3 }
+            Self { rays: 1 << 16, samples: 1 << 19, most_quota: 64, band: 1 << 21, color_weight: 1e-3 }
         }
     }
 

@@ -73,6 +73,11 @@ impl Renderer {
     /// # Errors
     /// Without lenses, or when the adapter cannot hold a round, or binds less than a kernel needs.
     pub fn new(field: &Field, lenses: &BTreeSet<LensKind>) -> Result<Self> {
+        Self::within(&Workspace::default(), field, lenses)
+    }
+
+    /// As [`Renderer::new`], where the steps of the field's training have their memory, as far as that goes.
+    pub(super) fn within(steps: &Workspace, field: &Field, lenses: &BTreeSet<LensKind>) -> Result<Self> {
         ensure!(
             !lenses.is_empty(),
             "a renderer needs the lenses of the cameras that it will be given, found none"
@@ -80,7 +85,10 @@ impl Renderer {
         let (gpu, plan) = (&field.gpu, field.plan.for_views(lenses));
         let mut workspace = Workspace::default();
         workspace.share(&field.arrays);
-        workspace.allocate(gpu, &plan.viewing_buffers())?;
+        let is_lent = |spec: &BufferSpec| steps.has(spec.name) && field.plan.lends(spec);
+        let (lent, own): (Vec<_>, Vec<_>) = plan.viewing_buffers().into_iter().partition(is_lent);
+        workspace.share_some(steps, &lent);
+        workspace.allocate(gpu, &own)?;
         let refill = march::scan(gpu, &plan, &workspace, march::Scanned::Free)?;
         let mut round = vec![viewing::rays(gpu, &plan, &workspace)?];
         round.extend(march::stages_over(gpu, &plan, &workspace, false, march::MarchExtent::Round)?);
@@ -100,10 +108,11 @@ impl Renderer {
         })
     }
 
-    /// Bytes on the device that a renderer of `plan` takes besides the parameters.
+    /// Bytes on the device that a renderer of a field takes besides its training, as `plan` has it.
     #[must_use]
-    pub fn bytes(plan: &Plan) -> u64 {
-        plan.for_views(&plan.features.lenses).viewing_buffers().iter().map(BufferSpec::bytes).sum()
+    pub fn bytes_besides(plan: &Plan) -> u64 {
+        let buffers = plan.for_views(&plan.features.lenses).viewing_buffers();
+        buffers.iter().filter(|spec| !plan.lends(spec)).map(BufferSpec::bytes).sum()
     }
 
     /// Renders what `camera` sees.

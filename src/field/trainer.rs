@@ -3,8 +3,10 @@
 //! It knows neither files nor progress bars: a step is a list of dispatches, and [`Trainer::report`] says
 //! what happened since the last report.
 
+use crate::camera::LensKind;
 use crate::field::checkpoint::Metadata;
 use crate::field::layout::pcg;
+use crate::field::renderer::Renderer;
 use crate::field::state::State;
 use crate::field::training_views::TrainingViews;
 use crate::field::visibility::hidden_cells;
@@ -16,6 +18,7 @@ use crate::gpu::Gpu;
 use crate::gpu::pass::Stage;
 use crate::gpu::timer::Timer;
 use anyhow::Result;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -190,6 +193,15 @@ impl Trainer {
     #[must_use]
     pub fn field(&self) -> &Field {
         &self.field
+    }
+
+    /// A renderer of the field as it is whenever a view is rendered, for cameras with `lenses`. It works in the memory of the
+    /// steps, between them.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn renderer(&self, lenses: &BTreeSet<LensKind>) -> Result<Renderer> {
+        Renderer::within(&self.workspace, &self.field, lenses)
     }
 
     /// The buffers, for checks.

@@ -153,7 +153,7 @@ impl Workspace {
     }
 
     /// Whether there is a buffer or a tensor of this name.
-    fn has(&self, name: &str) -> bool {
+    pub(super) fn has(&self, name: &str) -> bool {
         self.find(name).is_some() || self.tensors.iter().any(|tensor| tensor.name == name)
     }
 
@@ -161,6 +161,13 @@ impl Workspace {
     pub fn share(&mut self, other: &Self) {
         self.buffers.extend(other.buffers.iter().cloned());
         self.tensors.extend(other.tensors.iter().cloned());
+    }
+
+    /// Shares those buffers and tensors of `other` that are described.
+    pub fn share_some(&mut self, other: &Self, described: &[BufferSpec]) {
+        let is_described = |name: &str| described.iter().any(|spec| spec.name == name);
+        self.buffers.extend(other.buffers.iter().filter(|buffer| is_described(buffer.name)).cloned());
+        self.tensors.extend(other.tensors.iter().filter(|tensor| is_described(tensor.name)).cloned());
     }
 
     /// Binds `kernel` to what it uses; `renamed` pairs a WGSL name with the name here.

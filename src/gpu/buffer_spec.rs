@@ -81,6 +81,13 @@ impl BufferSpec {
         (self.size * self.count) as u64
     }
 
+    /// Whether something of this kind can be taken for `other`, of the same name.
+    #[must_use]
+    pub fn holds(&self, other: &Self) -> bool {
+        let shape = |spec: &Self| (spec.name, spec.kind, spec.size);
+        shape(self) == shape(other) && self.count >= other.count
+    }
+
     /// Whether the adapter can bind as much.
     ///
     /// # Errors

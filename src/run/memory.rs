@@ -74,7 +74,7 @@ impl MemoryUse {
         let photo_bytes = plan.photo_bytes(trained.pixels());
         let buffers = plan.training_buffers(plan.cell_count());
         let fixed: u64 = buffers.iter().map(BufferSpec::bytes).sum();
-        let views = if tested.cameras.is_empty() { 0 } else { Renderer::bytes(plan) };
+        let views = if tested.cameras.is_empty() { 0 } else { Renderer::bytes_besides(plan) };
         let device_bytes = fixed + photo_bytes + views;
         // One after the other: photos go to the device, which holds nothing else yet; parameters are drawn on the host or
         // read back for checkpoints; test views are compared with their photos.

@@ -13,9 +13,9 @@ use crate::config::Config;
 use crate::config::schedule::Budget;
 use crate::field::checkpoint::{Checkpoint, FORMAT, FrameContents, Metadata, SplitNames};
 use crate::field::layout::{Layout, finest_resolution};
-use crate::field::renderer::Renderer;
 use crate::field::state::State;
-use crate::field::{Capabilities, Field, Plan, SceneFeatures, Space};
+use crate::field::trainer::Trainer;
+use crate::field::{Capabilities, Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
 use crate::photo::Reading;
 use crate::photo::color_space::ColorSpace;
@@ -105,14 +105,14 @@ impl Resolved {
         }
     }
 
-    /// What measures test views of `field`, on black, with the photos of a `few` of them kept; `None`
+    /// What measures test views of what `trainer` trains, on black, with the photos of a `few` of them kept; `None`
     /// without test views.
     ///
     /// # Errors
     /// When the adapter refuses a kernel, or a photo cannot be read.
     pub fn evaluator<'a>(
         &self,
-        field: &Field,
+        trainer: &Trainer,
         dataset: &'a Dataset,
         few: usize,
     ) -> Result<Option<Evaluator<'a>>> {
@@ -120,7 +120,7 @@ impl Resolved {
             return Ok(None);
         }
         let features = &self.metadata.features;
-        let renderer = Renderer::new(field, &features.lenses)?;
+        let renderer = trainer.renderer(&features.lenses)?;
         let mut evaluator = Evaluator::new(renderer, ColorSpace::of(features.hdr), dataset);
         evaluator.keep(&evenly_spaced(&self.test, few))?;
         Ok(Some(evaluator))

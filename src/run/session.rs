@@ -124,7 +124,7 @@ impl<'a> TrainingRun<'a> {
         let mut trainer = Trainer::new(Field::new(&gpu, resolved.plan.clone())?, views)?;
         // While its kernels are compiled, which the first steps wait for.
         let evaluator = match evaluation.few(FEW_VIEWS) {
-            Some(few) => resolved.evaluator(trainer.field(), dataset, few)?,
+            Some(few) => resolved.evaluator(&trainer, dataset, few)?,
             None => None,
         };
         trainer.warm_up()?;

@@ -9,6 +9,7 @@ use nerf::field::state::State;
 use nerf::field::trainer::{StepStats, Trainer};
 use nerf::field::training_views::TrainingViews;
 use nerf::field::{Counters, Field, Plan, SceneFeatures, Space};
+use nerf::gpu::buffer_spec::BufferSpec;
 use nerf::gpu::{Gpu, adapter};
 use nerf::photo::{Image, Pixels};
 use std::sync::Arc;
@@ -371,4 +372,26 @@ fn parts_that_do_not_fit_are_refused() {
     let masked = Plan { features: masked, ..field.plan().clone() };
     let mixed = Trainer::new(Field::new(gpu, masked).expect("a field"), views(field.plan()));
     assert!(refusal(mixed.map(drop).expect_err("another plan")).contains("another plan"));
+}
+
+/// Views in the memory of the steps show what others show, and leave no trace in the training.
+#[test]
+fn views_between_steps_change_nothing() {
+    let batch = Batch { kept: 32_768, samples: 65_536, rays: 8192, first_rays: 128 };
+    let trained = |every: u32| {
+        let mut training =
+            Scene::default().train_with(Config { batch: batch.clone(), deterministic: true, ..config() });
+        let plan = training.trainer.plan();
+        let alone = plan.for_views(&plan.features.lenses).viewing_buffers();
+        let alone: u64 = alone.iter().map(BufferSpec::bytes).sum();
+        let besides = Renderer::bytes_besides(plan);
+        assert!(!training.gpu.is_cpu() || besides < alone / 5 * 3, "{besides} of {alone} bytes");
+        let mut renderer = training.trainer.renderer(&plan.features.lenses).expect("a renderer");
+        for _ in 0..40 / every {
+            training.steps(every);
+            assert!(renderer.render(&training.camera).expect("a view") == training.finite_view());
+        }
+        training.finite_state()
+    };
+    assert!(trained(5) == trained(40));
 }

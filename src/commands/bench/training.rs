@@ -144,9 +144,9 @@ impl Benchmark<'_> {
         let load_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let mut trainer = Trainer::new(Field::new(&self.gpu, resolved.plan.clone())?, views)?;
-        trainer.warm_up()?;
-        let evaluator = resolved.evaluator(trainer.field(), self.dataset, self.views)?;
+        let evaluator = resolved.evaluator(&trainer, self.dataset, self.views)?;
         let mut evaluator = evaluator.context("the dataset has no test views")?;
+        trainer.warm_up()?;
         let compile_seconds = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let stepper = Stepper::new(trainer, StepClock::new(&resolved.metadata, 0.0));
