@@ -144,6 +144,23 @@ fn signals_while_measuring_and_rendering() {
     }
 }
 
+#[test]
+fn a_killed_generation_is_begun_again() {
+    let out = place("killed");
+    let generate =
+        |size| ["generate", "toys", "--views", "200", "--samples", "1", "--size", size, "--out", text(&out)];
+    let running = Running::nerf(&generate("300")).until(is_there(out.join("train/0000.png")));
+    assert_eq!(running.signal("KILL").end().0, None);
+    assert!(!out.join("transforms_train.json").exists());
+    let (code, _, errors) = Running::nerf(&generate("8")).end();
+    assert_eq!(code, Some(0), "{errors}");
+    let picture = image::image_dimensions(out.join("train/0000.png")).expect("a picture");
+    let left: Vec<_> = whole_files(&out).into_iter().filter(|file| file.is_file()).collect();
+    assert_eq!((picture, left.len()), ((8, 8), 3), "{left:?}");
+    let (code, _, errors) = Running::nerf(&generate("8")).end();
+    assert!(code == Some(1) && errors.contains("is not empty"), "a whole one stays: {errors}");
+}
+
 /// As nohup starts it.
 #[cfg(target_os = "linux")]
 #[test]

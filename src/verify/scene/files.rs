@@ -12,8 +12,11 @@ use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The file that is there until the dataset is whole: what is beside it is not.
+const UNFINISHED: &str = ".nerf-unfinished";
 
 /// See [`super::generate`].
 pub(super) fn write(
@@ -28,17 +31,19 @@ pub(super) fn write(
         .flat_map(|split| (0..view_count(options, split)).map(move |index| (split, index)))
         .map(|(split, index)| GeneratedView { split, index, camera: camera(scene, options, split, index) })
         .collect();
-    let written = write_views(scene, options, &views, out, progress);
+    let list = || {
+        // Without that of the training views, which comes last, it is no dataset.
+        for split in SPLITS.into_iter().rev() {
+            let frames = views.iter().filter(|view| view.split == split);
+            write_json(&listing_path(out, split), &listing(scene, options, frames))?;
+        }
+        fs::remove_file(out.join(UNFINISHED)).with_context(|| format!("finishing {}", out.display()))
+    };
+    let written = write_views(scene, options, &views, out, progress).and_then(|()| list());
     if written.is_err() {
-        // The folder was empty. What cannot be removed does no harm: there is no list of it.
-        SPLITS.iter().for_each(|split| drop(fs::remove_dir_all(out.join(split.name()))));
+        clear(out);
     }
     written?;
-    for split in SPLITS {
-        let frames = views.iter().filter(|view| view.split == split);
-        let listing = listing(scene, options, frames);
-        write_json(&out.join(format!("transforms_{}.json", split.name())), &listing)?;
-    }
     let files = 2 * views.len() + SPLITS.len();
     Ok(Summary { scene: scene.info().name, views: views.len(), files })
 }
@@ -65,14 +70,33 @@ fn write_views(
     })
 }
 
-/// Creates the folder `out`, or accepts it where it is empty; nobody else writes to it meanwhile.
+/// Creates the folder `out`, or accepts it where it is empty, or where a process that wrote to it was killed; nobody else
+/// writes to it meanwhile.
 fn claim(out: &Path) -> Result<FolderLock> {
     is_used(out)?;
     let lock = FolderLock::alone(out)?;
+    if out.join(UNFINISHED).exists() {
+        clear(out);
+    }
     if is_used(out)? {
         bail!("{} is not empty; name a new or empty folder, or remove it first", out.display());
     }
+    fs::File::create(out.join(UNFINISHED)).with_context(|| format!("writing to {}", out.display()))?;
     Ok(lock)
+}
+
+/// Removes what was written of a dataset to a folder that was empty. What cannot be removed does no harm: there is no list of
+/// it.
+fn clear(out: &Path) {
+    for split in SPLITS {
+        let _ = fs::remove_file(listing_path(out, split));
+        let _ = fs::remove_dir_all(out.join(split.name()));
+    }
+    let _ = fs::remove_file(out.join(UNFINISHED));
+}
+
+fn listing_path(out: &Path, split: Split) -> PathBuf {
+    out.join(format!("transforms_{}.json", split.name()))
 }
 
 /// One picture of the dataset.
