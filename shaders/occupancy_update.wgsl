@@ -12,5 +12,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let cell = visible_cells[step.first_cell + index * step.cell_stride];
-    occupancy_raise(cell, density_log(density_out_load(index * DENSITY_QUADS).x));
+    occupancy_raise(cell, occupancy_depth(density_log(density_out_load(index * DENSITY_QUADS).x)));
 }

@@ -5,17 +5,16 @@
 // group that stays lighter than LIGHT_SHARE of the floor is kept by chance; what that adds to the ray's weight or takes
 // from it is made up for by the estimate's next kept sample. Opacity and transmittance are those of all samples.
 // Nothing is kept behind the point where the ray is opaque; see `reference::selection`.
-// needs: counters, density, exp, group, occupancy_raise, random, space, step
+// needs: counters, exp, group, marched, occupancy_raise, random, step
 
-tensor<read> samples: vec4<f32>;
-tensor<read> density_out: vec4<f32>;
 var<storage, read> ray_spans: array<vec2<u32>>;
 var<storage, read_write> kept_spans: array<vec2<u32>>;
 // Optical depth behind the last kept sample of each ray.
 var<storage, read_write> ray_tails: array<f32>;
-// The chosen samples of ray r from index ray_spans[r].x on: sample (as a number), the optical depth of those left out
-// in front of it, and its gains: the weight that its colour has in both estimates, as a multiple of its own.
-tensor<write> chosen: vec4<f32>;
+// The marched samples, over which the chosen ones of ray r are written from index ray_spans[r].x on: sample (as a number),
+// the optical depth of those left out in front of it, and its gains: the weight that its colour has in both estimates, as a
+// multiple of its own.
+tensor<read_write> chosen: vec4<f32>;
 
 // A sample: its index, its weight, the optical depth in front of it and its own.
 struct Member {
@@ -103,17 +102,13 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let nobody = Member(0u, 1.0, 0.0, 0.0);
     var walk = Walk(span.x, 0.0, vec2(0.0), 0.0, nobody, nobody);
     // The next sample is on its way while this one is weighed.
-    var next_sample = samples_load(span.x);
-    var next_raw = density_out_load(span.x * DENSITY_QUADS).x;
+    var next = chosen_load(span.x);
     for (var i = span.x; i < span.x + span.y; i++) {
-        let sample = next_sample;
-        let log_density = density_log(next_raw);
-        next_sample = samples_load(i + 1u);
-        next_raw = density_out_load((i + 1u) * DENSITY_QUADS).x;
-        let tau = optical_depth(log_density, sample.w);
-        let member = Member(i, transmittance * opacity(tau), depth, tau);
+        let sample = marched_unpack(next);
+        next = chosen_load(i + 1u);
+        let member = Member(i, transmittance * sample.alpha, depth, sample.tau);
         // Where rays go, the occupancy grid costs no samples of its own.
-        occupancy_raise(space_cell(sample.xyz), log_density);
+        occupancy_raise(sample.cell, sample.occupancy);
         if member.weight >= WEIGHT_FLOOR {
             walk = close(walk);
             walk = keep(walk, member, 1.0 + walk.carry / max(member.weight, 1e-30));
@@ -124,7 +119,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                 walk = close(walk);
             }
         }
-        depth += tau;
+        depth += sample.tau;
         transmittance = exp_accurate(-depth);
         if transmittance < STOP_TRANSMITTANCE {
             break;

@@ -67,9 +67,10 @@ impl Work {
             }),
             "density hidden" => Some(product(&layout.density[0], marched)),
             "density out" => Some(product(&layout.density[1], marched)),
+            "opacities" => bytes(marched * 3.0 * QUAD),
             // Each sample raises its cell of the occupancy grid.
             "select" => Some(Self {
-                bytes: rays * 20.0 + marched * 2.0 * QUAD + kept * QUAD,
+                bytes: rays * 20.0 + marched * QUAD + kept * QUAD,
                 atomics: marched,
                 of_occupancy: true,
                 ..Self::default()

@@ -4,6 +4,7 @@
 var<storage, read_write> dispatch: array<vec3<u32>>;
 
 fn dispatch_over_samples(count: u32) {
+    dispatch[DISPATCH_SAMPLES] = workgroups(count, 1u);
     dispatch[DISPATCH_ENCODE] = vec3(workgroups(count, 1u).x, LEVELS / 2u, 1u);
     dispatch[DISPATCH_SAMPLE_TILES] = workgroups(count, SAMPLES_PER_THREAD);
 }

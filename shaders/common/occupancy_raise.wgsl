@@ -6,7 +6,10 @@
 // which is beyond all.
 var<storage, read_write> occupancy: array<atomic<u32>>;
 
-fn occupancy_raise(cell: u32, log_density: f32) {
-    let tau = exp_accurate(log_density) * STEP_MIN * DENSITY_SCALE;
-    atomicMax(&occupancy[cell], bitcast<u32>(tau));
+fn occupancy_depth(log_density: f32) -> f32 {
+    return exp_accurate(log_density) * STEP_MIN * DENSITY_SCALE;
+}
+
+fn occupancy_raise(cell: u32, depth: f32) {
+    atomicMax(&occupancy[cell], bitcast<u32>(depth));
 }

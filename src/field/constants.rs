@@ -75,6 +75,7 @@ impl Plan {
             ("MOST_QUOTA", self.rounds.most_quota),
             ("NO_PIXEL", u32::MAX as usize),
             ("DISPATCH_RAYS", dispatch::RAYS),
+            ("DISPATCH_SAMPLES", dispatch::SAMPLES),
             ("DISPATCH_ENCODE", dispatch::ENCODE),
             ("DISPATCH_SAMPLE_TILES", dispatch::SAMPLE_TILES),
             ("DISPATCH_KEPT", dispatch::KEPT),

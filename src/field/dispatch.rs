@@ -2,15 +2,17 @@
 
 /// Over rays.
 pub const RAYS: usize = 0;
+/// Over marched samples.
+pub const SAMPLES: usize = 1;
 /// Over marched samples and pairs of levels.
-pub const ENCODE: usize = 1;
+pub const ENCODE: usize = 2;
 /// Over marched samples, several per thread.
-pub const SAMPLE_TILES: usize = 2;
+pub const SAMPLE_TILES: usize = 3;
 /// Over kept samples.
-pub const KEPT: usize = 3;
+pub const KEPT: usize = 4;
 /// Over kept samples, several per thread.
-pub const KEPT_TILES: usize = 4;
+pub const KEPT_TILES: usize = 5;
 /// Over levels and runs of kept samples, four threads each.
-pub const SCATTER: usize = 5;
+pub const SCATTER: usize = 6;
 /// How many there are.
-pub const COUNT: usize = 6;
+pub const COUNT: usize = 7;

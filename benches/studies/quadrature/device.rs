@@ -19,7 +19,7 @@ pub(crate) const STOP: f64 = 1e-4;
 const SAMPLES_ON_CPU: usize = 1 << 18;
 const SAMPLES_ON_GPU: usize = 1 << 20;
 /// The stages between densities and colours.
-const SELECTING: [&str; 3] = ["select", "scan kept", "kept"];
+const SELECTING: [&str; 4] = ["opacities", "select", "scan kept", "kept"];
 
 /// A way to composite.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -40,15 +40,16 @@ pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
 /// # Errors
 /// When a kernel cannot be built.
 pub fn stages(gpu: &Gpu, plan: &Plan, workspace: &Workspace, selection: SelectionMode) -> Result<Vec<Stage>> {
-    let (select, packing) = match selection {
+    let (mut stages, packing) = match selection {
         SelectionMode::Training => {
-            (plan.stage(gpu, workspace, &Link::of("select"), dispatch::RAYS)?, "training")
+            let opacities = plan.stage(gpu, workspace, &Link::of("opacities"), dispatch::SAMPLES)?;
+            (vec![opacities, plan.stage(gpu, workspace, &Link::of("select"), dispatch::RAYS)?], "training")
         }
-        SelectionMode::View => (viewing::select(gpu, plan, workspace)?, "view"),
+        SelectionMode::View => (vec![viewing::select(gpu, plan, workspace)?], "view"),
     };
     let kept = plan.stage(gpu, workspace, &Link::of("kept").with("packing", packing), dispatch::RAYS)?;
     let input = plan.stage(gpu, workspace, &Link::of("color input"), dispatch::KEPT)?;
-    let mut stages = vec![select, scan(gpu, plan, workspace, Scanned::Kept)?, kept, input];
+    stages.extend([scan(gpu, plan, workspace, Scanned::Kept)?, kept, input]);
     stages.extend(network(gpu, plan, workspace)?);
     Ok(stages)
 }

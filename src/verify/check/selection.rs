@@ -12,7 +12,7 @@ use crate::verify::reference::selection::{self, Luck, select};
 use anyhow::Result;
 
 /// The stages of [`color::stages`] up to the packed samples.
-const STAGES: usize = 3;
+const STAGES: usize = 4;
 
 /// The selection of a plan on a workbench.
 #[derive(Debug)]
