@@ -86,17 +86,15 @@ impl Plan {
 }
 
 impl Workspace {
-    /// Room for training steps of `field`, which visit the cells `visible` of its occupancy grid; the photos are
-    /// added later.
+    /// Room for training steps of `field`, whichever cells of its occupancy grid they visit; the photos are added later.
     ///
     /// # Errors
     /// When the adapter cannot hold it.
-    pub fn for_training(field: &Field, visible: &[u32]) -> Result<Self> {
+    pub fn for_training(field: &Field) -> Result<Self> {
         let (gpu, plan) = (field.gpu(), field.plan());
         let mut workspace = Self::default();
         workspace.share(&field.arrays);
-        workspace.allocate(gpu, &plan.step_buffers(visible.len()))?;
-        workspace.write(gpu, "visible_cells", visible);
+        workspace.allocate(gpu, &plan.step_buffers(plan.cell_count()))?;
         Ok(workspace)
     }
 }

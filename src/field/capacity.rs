@@ -56,7 +56,9 @@ impl Rounds {
         if adapter.is_cpu {
             Self { rays: 1 << 13, samples: 1 << 15, most_quota: 16, band: 1 << 20, color_weight: 1e-3 }
         } else {
-            Self { rays: 1 << 16, samples: 1 << 19, most_quota: 64, band: 1 << 21, color_weight: 1e-3 }
+            // With what is behind the last sample, activations of 64 numbers take the 128 MiB that every adapter binds.
+            let samples = (1 << 19) - (1 << 10);
+            Self { rays: samples / 8, samples, most_quota: 64, band: 1 << 21, color_weight: 1e-3 }
         }
     }
 

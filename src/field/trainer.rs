@@ -67,15 +67,17 @@ impl Trainer {
         views.check_for(&field.plan)?;
         let (gpu, plan) = (Arc::clone(&field.gpu), field.plan.clone());
         plan.check(&gpu)?;
-        let hidden =
-            hidden_cells(&views.cameras, &views.silhouettes, &views.space, plan.config.occupancy.cells);
-        let visible: Vec<u32> =
-            (0..).zip(&hidden).filter(|(_, hidden)| !**hidden).map(|(cell, _)| cell).collect();
-        let mut workspace = Workspace::for_training(&field, &visible)?;
+        let mut workspace = Workspace::for_training(&field)?;
         workspace.add(gpu.storage_with("cameras", &views.on_device)?);
         workspace.add_pages(views.pages);
         let stages = step_stages(&gpu, &plan, &workspace, views.on_device.len())?;
         let occupancy = occupancy::Update::new(&gpu, &plan, &workspace)?;
+        // While the kernels are compiled.
+        let hidden =
+            hidden_cells(&views.cameras, &views.silhouettes, &views.space, plan.config.occupancy.cells);
+        let visible: Vec<u32> =
+            (0..).zip(&hidden).filter(|(_, hidden)| !**hidden).map(|(cell, _)| cell).collect();
+        workspace.write(&gpu, "visible_cells", &visible);
         let visible_cells = visible.len() as u32;
         field.step_excess = StepExcess::Counted(workspace.get("counters").clone());
         let mut trainer = Self { field, workspace, stages, occupancy, step: 0, hidden, visible_cells };

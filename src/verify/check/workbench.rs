@@ -79,7 +79,8 @@ impl Workbench {
     pub fn new(gpu: &Arc<Gpu>, setup: &Setup) -> Result<Self> {
         let plan = setup.plan(gpu)?;
         let field = Field::new(gpu, plan)?;
-        let mut workspace = Workspace::for_training(&field, &visible_cells(field.plan()))?;
+        let mut workspace = Workspace::for_training(&field)?;
+        workspace.write(gpu, "visible_cells", &visible_cells(field.plan()));
         workspace.add(gpu.storage::<f32>("weights", field.plan().capacity.samples)?);
         let bench = Self::of(field, workspace)?;
         bench.set_step(quiet_step());
