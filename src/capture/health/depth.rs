@@ -27,6 +27,10 @@ const OFF: f64 = 1.1;
 const AGREE: f64 = 0.25;
 /// or where as it is there is more than this part of it.
 const AS_WELL: f64 = 0.5;
+/// Where more of it agrees, depth is not inverse;
+const CLEARLY: f64 = 0.6;
+/// it is where so many times as much of its inverse does.
+const OFTEN: f64 = 1.5;
 /// Depth in the middle that differs by this factor from the distance to what the cameras look at.
 const OFF_FOCUS: f64 = 4.0;
 
@@ -109,6 +113,12 @@ impl Sample {
             depth: reduce_depth(&depth, size, small),
             colors: photo_over(&photo.image.reduced(small), [0.0; 3]),
         }
+    }
+
+    /// The same where the files have inverse depth.
+    fn inverted(&self) -> Self {
+        let invert = |depth: &f32| if *depth > 0.0 { depth.recip() } else { 0.0 };
+        Self { depth: self.depth.iter().map(invert).collect(), ..self.clone() }
     }
 
     /// Places in the picture, with known depth and colour there.
@@ -258,11 +268,35 @@ impl DepthSurvey {
         })
     }
 
+    /// Depth whose inverse agrees, where at most `part` of it does as it is.
+    fn inverse(&self, samples: &HashMap<usize, &Sample>, part: f64) -> Option<Diagnostic> {
+        if part >= CLEARLY {
+            return None;
+        }
+        let inverted: HashMap<usize, Sample> =
+            samples.iter().map(|(index, sample)| (*index, sample.inverted())).collect();
+        let inverse = scale::agreement(&self.groups, |index| inverted.get(&index))?;
+        let scale = self.looks.first()?.1.scale;
+        (inverse.part >= AGREE.max(OFTEN * part)).then(|| {
+            Diagnostic::warning(format!(
+                "depth is probably inverse (disparity): {} of what views see in common has one place and colour at {} / \
+                 value, and at most {} at any multiple of the values; if so, export depth itself",
+                percent(inverse.part),
+                length(inverse.factor / scale),
+                percent(part)
+            ))
+        })
+    }
+
     /// Depth in other units than the poses.
     fn units(&self, dataset: &Dataset) -> Option<Diagnostic> {
         let samples = || self.looks.iter().filter_map(|(index, look)| Some((*index, look.sample.as_ref()?)));
         let by_frame: HashMap<usize, &Sample> = samples().collect();
         let found = scale::agreement(&self.groups, |index| by_frame.get(&index).copied());
+        let part = found.map_or(0.0, |agreement| agreement.part);
+        if let Some(inverse) = self.inverse(&by_frame, part) {
+            return Some(inverse);
+        }
         let found = found.filter(|agreement| agreement.part >= AGREE);
         let scale = self.looks.first()?.1.scale;
         let remedy = |factor: f64| {

@@ -84,6 +84,20 @@ fn depth_in_the_units_of_the_poses_raises_no_alarm() {
 }
 
 #[test]
+fn inverse_depth_is_told() {
+    let inverse = |path: &Path, depth: &[f32]| {
+        let invert = |z: &f32| if *z > 0.0 { 7.0 / z } else { 0.0 };
+        npy(0.0)(path, &depth.iter().map(invert).collect::<Vec<_>>());
+    };
+    let result = with_depth("npy", inverse).info();
+    result.expect(0, "warning", &["depth is probably inverse (disparity)", "export depth itself"], &[]);
+    let said = result.of_severity("warning").concat();
+    let factor = said.split(" / value").next().and_then(|before| before.rsplit(' ').next());
+    let factor: f64 = factor.expect("a factor").parse().expect("a number");
+    assert!((factor / 7.0 - 1.0).abs() < 0.05, "{said}");
+}
+
+#[test]
 fn stand_ins_for_far_away_are_counted() {
     let known = part(&Toys::new().info().json, "known");
     for toys in [
