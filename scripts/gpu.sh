@@ -41,7 +41,7 @@ parts=(
     'train_lego_12s_seed1 40  18'
     'train_lego_12s_seed2 40  18'
     'sweep_kept_16        25   9'
-    'sweep_kept_17        25   9'
+    'sweep_kept_18        25   9'
     'sweep_kept_19        25   9'
     'sweep_table_17       25   9'
     'sweep_table_21       25   9'

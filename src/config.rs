@@ -262,7 +262,7 @@ impl Default for Occupancy {
 
 impl Default for Batch {
     fn default() -> Self {
-        Self { kept: 1 << 18, samples: 1 << 20, rays: 1 << 17, first_rays: 4096 }
+        Self { kept: 1 << 17, samples: 1 << 19, rays: 1 << 17, first_rays: 4096 }
     }
 }
 
@@ -275,7 +275,7 @@ impl Default for Selection {
 impl Default for Optimizer {
     fn default() -> Self {
         Self {
-            learning_rate: 1e-2,
+            learning_rate: 2e-2,
             final_learning_rate: 1e-4,
             beta_1: 0.9,
             beta_2: 0.99,
