@@ -26,6 +26,7 @@ pub mod results;
 mod scene_features;
 mod scores;
 mod session;
+mod settings;
 mod stage_times;
 mod stepper;
 mod trained;
@@ -42,6 +43,7 @@ pub use options::{EvaluationAtEnd, EvaluationOptions, SavingOptions, TrainOption
 pub use resolve::Resolved;
 pub use scores::{Means, Score, Scores};
 pub use session::{NoTestViews, TrainingEnd, TrainingRun, TrainingSession};
+pub use settings::Settings;
 pub use stage_times::StageTimes;
 pub use stepper::{Block, Stepper};
 pub use trained::TrainedField;

@@ -20,7 +20,7 @@ use nerf::capture::unreadable::{Kind, Unreadable, kinds};
 use nerf::config::Config;
 use nerf::gpu::Gpu;
 use nerf::photo::Reading;
-use nerf::run::{Estimate, TrainOptions};
+use nerf::run::{Estimate, Settings, TrainOptions};
 use nerf::support::file::write_atomically;
 use nerf::support::transient::is_transient;
 use rayon::prelude::*;
@@ -118,7 +118,7 @@ fn inspect<'a>(args: &'a Info, dataset: &'a Dataset, session: &Session<'_>) -> R
 fn config(args: &Info, dataset: &Dataset, gpu: Option<&Gpu>) -> Result<Config> {
     let options =
         TrainOptions { config: args.config.clone(), set: args.set.clone(), ..TrainOptions::default() };
-    options.configure(Config::for_dataset(dataset, gpu.is_some_and(Gpu::is_cpu))?)
+    Ok(Settings::of(&options, dataset, gpu)?.config)
 }
 
 /// Reads all depth files, in parallel.

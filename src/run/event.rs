@@ -124,6 +124,15 @@ pub struct StepsTaken {
 pub enum Warning<'a> {
     /// The run begins although its memory seems not to suffice, as asked.
     Overcommitted(Shortage),
+    /// The adapter does not bind buffers for the usual batch.
+    SmallerBatch {
+        /// Its name.
+        adapter: &'a str,
+        /// Kept samples of a step.
+        kept: usize,
+        /// As many as there are usually.
+        usual: usize,
+    },
     /// Masks ignore every pixel of some training photos.
     IgnoredPhotos {
         /// The photos.
@@ -197,6 +206,11 @@ impl fmt::Display for Warning<'_> {
             Self::Overcommitted(shortage) => {
                 write!(f, "{shortage}; it begins all the same, as asked, and the system may end it")
             }
+            Self::SmallerBatch { adapter, kept, usual } => write!(
+                f,
+                "the adapter '{adapter}' binds no buffers for the usual batch: steps have {kept} kept samples instead of \
+                 {usual}"
+            ),
             Self::IgnoredPhotos { names, all } => write!(
                 f,
                 "masks ignore every pixel of {} of {all} training photos, which add nothing: {}",

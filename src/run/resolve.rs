@@ -6,6 +6,7 @@ use super::event::{Event, Observer, Warning};
 use super::memory::MemoryUse;
 use super::options::TrainOptions;
 use super::scene_features::NO_FRAME;
+use super::settings::Settings;
 use super::training_photos::TrainingPhotos;
 use crate::camera::orbit::Orbit;
 use crate::capture::dataset::{Dataset, evenly_spaced};
@@ -37,6 +38,8 @@ pub struct Resolved {
     pub train: Vec<usize>,
     /// Indices of the frames to measure on.
     pub test: Vec<usize>,
+    /// Kept samples of the usual batch, where the adapter does not bind buffers for as many.
+    pub usual_kept: Option<usize>,
 }
 
 impl Resolved {
@@ -45,11 +48,13 @@ impl Resolved {
     /// # Errors
     /// When there is no frame to train on, a setting is unknown or out of range, or the photos are no use to it.
     pub fn new_run(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<Self> {
-        let metadata = first(options, dataset, gpu)?;
+        ensure!(!dataset.train.is_empty(), NO_FRAME);
+        let Settings { config, usual_kept } = Settings::of(options, dataset, Some(gpu))?;
+        let metadata = first(options, dataset, config)?;
         let metadata = ended(metadata, options, gpu, None)?;
         let plan = metadata.plan(Capabilities::of(gpu));
         let (train, test) = (dataset.train.clone(), dataset.test.clone());
-        Ok(Self { metadata, plan, state: None, train, test })
+        Ok(Self { metadata, plan, state: None, train, test, usual_kept })
     }
 
     /// The run that `checkpoint` holds, on the frames that it was trained on and with what `options` change.
@@ -71,7 +76,7 @@ impl Resolved {
         let metadata = again(options, metadata, dataset, &train)?;
         let metadata = ended(metadata, options, gpu, Some(earlier))?;
         let plan = metadata.plan(Capabilities::of(gpu));
-        Ok(Self { metadata, plan, state: Some(state), train, test })
+        Ok(Self { metadata, plan, state: Some(state), train, test, usual_kept: None })
     }
 
     /// The photos to train on.
@@ -158,10 +163,8 @@ fn ended(metadata: Metadata, options: &TrainOptions, gpu: &Gpu, earlier: Option<
     Ok(metadata)
 }
 
-fn first(options: &TrainOptions, dataset: &Dataset, gpu: &Gpu) -> Result<Metadata> {
-    ensure!(!dataset.train.is_empty(), NO_FRAME);
+fn first(options: &TrainOptions, dataset: &Dataset, config: Config) -> Result<Metadata> {
     let bounds = dataset.bounds.clone();
-    let config = options.configure(Config::for_dataset(dataset, gpu.is_cpu())?)?.with_finest(dataset);
     let names = |indices: &[usize]| indices.iter().map(|&index| dataset.frames[index].name.clone()).collect();
     let orbit = Orbit::of(&dataset.cameras(&dataset.train), bounds.center);
     let splits =

@@ -104,6 +104,10 @@ impl<'a> TrainingRun<'a> {
         let Self { gpu, dataset, mut resolved, mut folder, evaluation, saving, overcommit } = self;
         let Resolved { metadata, plan, test, .. } = &resolved;
         observer.notice(&Event::Resolved { metadata, plan, gpu: &gpu, test_views: test.len() });
+        if let Some(usual) = resolved.usual_kept {
+            let kept = metadata.config.batch.kept;
+            observer.notice(&Event::Warning(Warning::SmallerBatch { adapter: &gpu.info.name, kept, usual }));
+        }
         let tested = if evaluation.few(FEW_VIEWS).is_some() { &resolved.test[..] } else { &[] };
         let memory = resolved.check_memory(&gpu, dataset, tested, overcommit, observer)?;
         if folder.is_unguarded() {
