@@ -65,7 +65,7 @@ done
 commit=$(git rev-parse --short HEAD 2>/dev/null || echo unknown)
 [ -z "$(git status --porcelain 2>/dev/null)" ] || commit="$commit with changes"
 glibc=$(objdump -T "$bundle/bin/nerf" 2>/dev/null | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -n 1 | cut -d_ -f2)
-printf 'commit %s\nbuilt_for %s\nglibc %s\n' "$commit" "$(uname -m)" "${glibc:-unknown}" >"$bundle/BUNDLE"
+printf 'commit %s\nbuilt_for %s\nglibc %s\ndatasets %s\n' "$commit" "$(uname -m)" "${glibc:-unknown}" "$datasets" >"$bundle/BUNDLE"
 
 tar -C "$work" -czf "$out/nerf-gpu.tar.gz" nerf-gpu
 cat >"$out/RUN.md" <<END

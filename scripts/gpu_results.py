@@ -60,6 +60,7 @@ def collect(files):
     return {
         "date": date if re.fullmatch(r"\d{4}-\d\d-\d\d", date) else "unknown-date",
         "commit": meta.get("commit", "unknown"),
+        "datasets": meta.get("datasets", "").split(),
         "rehearsal": meta.get("rehearsal") == "1",
         "adapter": listed[0] if listed else None,
         "machine": files.get("machine.txt", MISSING).splitlines(),
@@ -241,6 +242,12 @@ def report(result):
     return f"# {title}\n" + "".join(f"\n{'## ' + name + chr(10) * 2 if name else ''}{text}\n" for name, text in sections.items())
 
 
+def lego(result):
+    """Of how many pixels a side lego is."""
+    sides = [name.split("_", 1)[1] for name in result.get("datasets", []) if name.startswith("lego_")]
+    return f"{sides[0]} px: " if sides else ""
+
+
 def readme_row(result):
     adapter, step = result["adapter"], result["measured"].get("step")
     verdicts = checks(result)
@@ -251,7 +258,7 @@ def readme_row(result):
         right,
         result["deterministic"],
         guarded(lambda _: number(throughput(step)[0]), result),
-        " / ".join(psnr(result, f"train_lego_{budget}s") for budget in BUDGETS),
+        lego(result) + " / ".join(psnr(result, f"train_lego_{budget}s") for budget in BUDGETS),
         " / ".join(psnr(result, f"train_scene_{budget}s") for budget in BUDGETS),
         psnr(result, "train_fox_12s"),
         guarded(view_ms, result),
@@ -269,7 +276,7 @@ def readme_table(results):
             print(f"warning: {path} is left out: {type(error).__name__} {error}", file=sys.stderr)
     budgets = " / ".join(BUDGETS)
     head = [
-        "adapter", "date", "`nerf check`", "`--deterministic` twice", "ms a step", f"lego_200 after {budgets} s, dB",
+        "adapter", "date", "`nerf check`", "`--deterministic` twice", "ms a step", f"lego after {budgets} s, dB",
         f"toys after {budgets} s, dB", "fox after 12 s, dB", "800x800 view, ms",
     ]
     rows = rows or [["none yet", *["-"] * (len(head) - 1)]]
