@@ -9,8 +9,8 @@ use anyhow::Result;
 
 /// Most times that the preset's batch is halved.
 const MOST_HALVINGS: u32 = 4;
-/// What a batch has room for less where it is halved: buffers have as many rows behind the last sample, and adapters bind
-/// a power of two.
+/// What a batch has room for less where it does not fit, halved or not: buffers have as many rows behind the last sample,
+/// and adapters bind a power of two.
 const SPARE_ROWS: usize = 1 << 10;
 
 /// The settings of a new run.
@@ -38,12 +38,12 @@ impl Settings {
             let plan = |features| Plan::new(gpu, config.clone(), features, Space::from(&dataset.bounds));
             config.validate().is_ok() && features.is_ok_and(|features| plan(features).check(gpu).is_ok())
         };
-        let halved =
-            (1..=MOST_HALVINGS).map(|halvings| Config { batch: halved(&usual, halvings), ..config.clone() });
+        let smaller = |halvings| Config { batch: halved(&usual, halvings), ..config.clone() };
+        let smaller = if fits(&config) { None } else { (0..=MOST_HALVINGS).map(smaller).find(fits) };
         // What no batch helps against is told by who needs it.
-        let smaller = if fits(&config) { None } else { halved.into_iter().find(fits) };
-        let usual_kept = smaller.is_some().then_some(usual.kept);
-        Ok(Self { config: smaller.unwrap_or(config), usual_kept })
+        let config = smaller.unwrap_or(config);
+        let usual_kept = (config.batch.kept < usual.kept).then_some(usual.kept);
+        Ok(Self { config, usual_kept })
     }
 }
 
