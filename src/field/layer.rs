@@ -3,7 +3,7 @@
 //! `shaders/common`.
 //!
 //! On CPUs a thread has whole rows of inputs in registers, several of them, since reading a weight costs as much as
-//! several multiplications. On GPUs workgroups share tiles; see [`tiled_layer`]. Rows behind the last are computed too;
+//! several multiplications. On GPUs workgroups share tiles, see `tiled_layer.rs`. Rows behind the last are computed too;
 //! all buffers have room for them.
 
 use super::generated::{COMPONENTS, group_size, line};
