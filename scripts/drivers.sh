@@ -41,7 +41,7 @@ long         --accumulation long
 float        --accumulation float
 exchange     --accumulation exchange
 buffers      --memory buffers
-buffers_gpu  --memory buffers --product 2 --accumulation exchange
+buffers_gpu  --memory buffers --product tiled --accumulation exchange
 textures     --memory textures
 one_row      --product 1
 four_rows    --product 4

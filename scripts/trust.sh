@@ -66,6 +66,7 @@ for accumulation in ordered fixed long float exchange; do
 done
 check 'buffers' --memory buffers
 check 'plain products' --product 1
+check 'tiles' --product tiled
 for vectors in tests/vectors/*.json; do
     check "$(basename "$vectors")" --vectors "$vectors"
 done
