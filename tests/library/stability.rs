@@ -344,12 +344,15 @@ fn steps_without_finite_gradients_are_skipped() {
 /// A software driver ends long loops without an error; ordered sums have a round per kept sample.
 #[test]
 fn batches_too_long_for_ordered_sums() {
-    for (kept, accumulation) in [(1 << 14, Accumulation::Ordered), (1 << 16, Accumulation::Fixed)] {
+    for (kept, is_short) in [(1 << 14, true), (1 << 16, false)] {
         let mut config = Config { accumulation: Accumulation::Ordered, ..config() };
         config.batch = Batch { kept, samples: 1 << 17, rays: 1 << 12, first_rays: 64 };
         let training = Scene::default().train_with(config);
-        let expected = if training.gpu.is_cpu() { accumulation } else { Accumulation::Ordered };
-        assert_eq!(training.trainer.plan().accumulation, expected, "{kept}");
+        let (chosen, orders) = (training.trainer.plan().accumulation, is_short || !training.gpu.is_cpu());
+        assert!(
+            if orders { chosen == Accumulation::Ordered } else { chosen.is_of_integers() },
+            "{kept}: {chosen:?}"
+        );
         training.survives(4);
     }
 }
