@@ -3,6 +3,9 @@
 use super::{Capabilities, SceneFeatures};
 use crate::config::Batch;
 
+/// Room behind the last sample for the rows that the last thread of a matrix product computes in vain.
+pub const SPARE_ROWS: usize = 1024;
+
 /// Room for rays and samples, which buffers are sized by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Capacity {
@@ -57,7 +60,7 @@ impl Rounds {
             Self { rays: 1 << 13, samples: 1 << 15, most_quota: 16, band: 1 << 20, color_weight: 1e-3 }
         } else {
             // With what is behind the last sample, activations of 64 numbers take the 128 MiB that every adapter binds.
-            let samples = (1 << 19) - (1 << 10);
+            let samples = (1 << 19) - SPARE_ROWS;
             Self { rays: samples / 8, samples, most_quota: 64, band: 1 << 21, color_weight: 1e-3 }
         }
     }

@@ -19,3 +19,11 @@ pub fn group_size() -> usize {
     let size = stated.and_then(|(size, _)| size.parse().ok());
     size.unwrap_or_else(|| unreachable!("shaders/common/group.wgsl states GROUP_SIZE"))
 }
+
+/// The rows of a weight gradient's `chunk`, from `begin` to `end`, and where its sums begin.
+pub(super) const CHUNK: &str = "    \
+    let share = (layer_count() + CHUNKS - 1u) / CHUNKS;
+    let begin = min(chunk * share, layer_count());
+    let end = min(begin + share, layer_count());
+    let base = chunk * MLP_QUADS + tile.first_quad;
+";

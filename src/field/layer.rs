@@ -6,7 +6,7 @@
 //! several multiplications. On GPUs workgroups share tiles, see `tiled_layer.rs`. Rows behind the last are computed too;
 //! all buffers have room for them.
 
-use super::generated::{COMPONENTS, group_size, line};
+use super::generated::{CHUNK, COMPONENTS, group_size, line};
 use super::tiled_layer;
 use std::fmt::Write;
 
@@ -182,7 +182,7 @@ impl Product {
 
 /// Each thread sums the gradients of four inputs: it reads their quad, and shares the outputs' gradients.
 fn shared_weight_gradient(quads: usize) -> String {
-    let mut text = String::from(SHARED_TILE_HEAD);
+    let mut text = String::from(SHARED_TILE_HEAD) + CHUNK;
     sums(&mut text, 4, quads);
     text.push_str("    for (var row = begin; row < end; row++) {\n");
     line!(text, "        let x = layer_input_load(tile_row(row) * tile.input_quads + input);");
@@ -208,6 +208,7 @@ fn own_weight_gradient(quads: usize) -> String {
     let tiles = quads / tile;
     let mut text =
         TILE_HEAD.replace("OUTPUT_TILES", &format!("{tiles}u")).replace("OUTPUT_QUADS", &format!("{tile}u"));
+    text.push_str(CHUNK);
     sums(&mut text, TILE_INPUTS, tile);
     text.push_str("    for (var row = begin; row < end; row++) {\n        let source = tile_row(row);\n");
     for quad in 0..TILE_INPUTS / 4 {
@@ -256,10 +257,6 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if input >= tile.input_quads {
         return;
     }
-    let share = (layer_count() + CHUNKS - 1u) / CHUNKS;
-    let begin = min(chunk * share, layer_count());
-    let end = min(begin + share, layer_count());
-    let base = chunk * MLP_QUADS + tile.first_quad;
 ";
 
 const SHARED_TILE_HEAD: &str = "\
@@ -274,8 +271,4 @@ fn main(
     let output = 0u;
     let first = group.x / CHUNKS * 8u;
     let input = min(first + lane, tile.input_quads - 1u);
-    let share = (layer_count() + CHUNKS - 1u) / CHUNKS;
-    let begin = min(chunk * share, layer_count());
-    let end = min(begin + share, layer_count());
-    let base = chunk * MLP_QUADS + tile.first_quad;
 ";

@@ -4,7 +4,7 @@
 //!
 //! A workgroup has `GROUP_SIZE` threads and as many rows. Rows behind the last are computed too; all buffers have room.
 
-use super::generated::{COMPONENTS, group_size, line};
+use super::generated::{CHUNK, COMPONENTS, group_size, line};
 use std::fmt::Write;
 
 /// Bytes of workgroup memory that every adapter has.
@@ -144,6 +144,7 @@ pub(super) fn weight_gradient(inputs: usize, outputs: usize) -> String {
     let WeightTiles { from, to, columns } = tiles;
     let rows = rows_at_once(from + to);
     let mut text = head("layer_count, tile");
+    text.push_str("    let chunk = group.x;\n");
     text.push_str(CHUNK);
     place(&mut text, columns);
     for part in 0..tiles.down() {
@@ -303,10 +304,3 @@ fn named(expression: &str, number: usize) -> String {
 fn tile(text: &mut String, name: &str, quads: usize) {
     line!(text, "var<workgroup> {name}_tile: array<vec4<f32>, {quads}>;");
 }
-
-const CHUNK: &str = "    \
-    let share = (layer_count() + CHUNKS - 1u) / CHUNKS;
-    let begin = min(group.x * share, layer_count());
-    let end = min(begin + share, layer_count());
-    let base = group.x * MLP_QUADS + tile.first_quad;
-";

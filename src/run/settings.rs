@@ -3,15 +3,13 @@
 use super::options::TrainOptions;
 use crate::capture::dataset::Dataset;
 use crate::config::{Batch, Config};
+use crate::field::capacity::SPARE_ROWS;
 use crate::field::{Plan, SceneFeatures, Space};
 use crate::gpu::Gpu;
 use anyhow::Result;
 
 /// Most times that the preset's batch is halved.
 const MOST_HALVINGS: u32 = 4;
-/// What a batch has room for less where it does not fit, halved or not: buffers have as many rows behind the last sample,
-/// and adapters bind a power of two.
-const SPARE_ROWS: usize = 1 << 10;
 
 /// The settings of a new run.
 #[derive(Clone, Debug)]
@@ -47,6 +45,7 @@ impl Settings {
     }
 }
 
+/// The batch halved so often. Buffers have spare rows behind the last sample, and adapters bind a power of two.
 fn halved(batch: &Batch, halvings: u32) -> Batch {
     let [kept, samples, rays] = [batch.kept, batch.samples, batch.rays].map(|count| count >> halvings);
     Batch { kept, samples: samples - SPARE_ROWS, rays, first_rays: batch.first_rays.min(rays as u32) }

@@ -1,7 +1,8 @@
 //! Marching where there is nothing, or more than fits.
 
 use anyhow::Result;
-use nerf::field::march::{SPARE_ROWS, Scanned, scan};
+use nerf::field::capacity::SPARE_ROWS;
+use nerf::field::march::{Scanned, scan};
 use nerf::verify::check::Setup;
 use nerf::verify::check::marching::Marching;
 

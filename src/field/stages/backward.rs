@@ -2,7 +2,7 @@
 
 use super::color::COLOR_HIDDEN;
 use super::density::{layer_stage, quads};
-use super::march::SPARE_ROWS;
+use crate::field::capacity::SPARE_ROWS;
 use crate::field::layout::{DENSITY_OUTPUTS, Layer};
 use crate::field::shared::Tile;
 use crate::field::sizes::WEIGHTS;

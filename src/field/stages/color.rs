@@ -1,8 +1,9 @@
 //! Choosing the samples that matter, and the colour network over them.
 
+use crate::field::capacity::SPARE_ROWS;
 use crate::field::density::{forward, layer_stage};
 use crate::field::layout::COLOR_INPUTS;
-use crate::field::march::{SPARE_ROWS, Scanned, scan};
+use crate::field::march::{Scanned, scan};
 use crate::field::{Link, Plan, Workspace, dispatch, viewing};
 use crate::gpu::Gpu;
 use crate::gpu::buffer_spec::BufferSpec;

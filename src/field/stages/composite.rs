@@ -1,6 +1,6 @@
 //! The fused render, loss and gradient kernel.
 
-use super::march::SPARE_ROWS;
+use crate::field::capacity::SPARE_ROWS;
 use crate::field::sizes::RAYS;
 use crate::field::{Capacity, Link, Plan, RayResult, Workspace, dispatch};
 use crate::gpu::Gpu;

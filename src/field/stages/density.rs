@@ -1,7 +1,7 @@
 //! The density network over all marched samples: encoding and two layers.
 
+use crate::field::capacity::SPARE_ROWS;
 use crate::field::layout::{DENSITY_OUTPUTS, Layer};
-use crate::field::march::SPARE_ROWS;
 use crate::field::{Link, Plan, Workspace, dispatch};
 use crate::gpu::Gpu;
 use crate::gpu::buffer::Buffer;

@@ -1,5 +1,6 @@
 //! From rays to samples: marching through the occupancy grid, and the scan that packs the samples.
 
+use crate::field::capacity::SPARE_ROWS;
 use crate::field::sizes::RAYS;
 use crate::field::{Capacity, Counters, Link, Plan, Step, Workspace, dispatch};
 use crate::gpu::Gpu;
@@ -7,9 +8,6 @@ use crate::gpu::buffer_spec::BufferSpec;
 use crate::gpu::pass::Stage;
 use crate::gpu::tensor::Element;
 use anyhow::Result;
-
-/// Room behind the last sample for the rows that the last thread of a matrix product computes in vain.
-pub const SPARE_ROWS: usize = 1024;
 
 /// Rays, their spans and the samples.
 pub(crate) fn buffers(plan: &Plan) -> Vec<BufferSpec> {
