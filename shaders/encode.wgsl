@@ -1,6 +1,6 @@
 // Hash-grid features of each sample, two levels per thread: one pair of levels per row of workgroups, so that their
 // entries stay in the cache.
-// needs: counters, grid, group
+// needs: counters, grid, group, rows
 
 tensor<read> samples: vec4<f32>;
 tensor<read> table: vec2<f32>;
@@ -27,7 +27,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let position = samples_load(index).xyz;
-    let low = encode_level(position, levels[2u * id.y]);
-    let high = encode_level(position, levels[2u * id.y + 1u]);
-    encoding_store(index * (LEVELS / 2u) + id.y, vec4(low, high));
+    let pair = row_spread(id.y, LEVELS / 2u);
+    let low = encode_level(position, levels[2u * pair]);
+    let high = encode_level(position, levels[2u * pair + 1u]);
+    encoding_store(index * (LEVELS / 2u) + pair, vec4(low, high));
 }

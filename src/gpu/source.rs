@@ -6,6 +6,7 @@
 use super::tensor::{self, Element, TensorMemory};
 use anyhow::{Result, anyhow};
 use std::fmt::{Display, Write};
+use std::iter;
 use wgpu::naga;
 
 /// WGSL text under construction: constants first, then parts, each once.
@@ -85,15 +86,13 @@ impl Source {
     /// The text that the driver compiles, before the buffers are numbered.
     #[must_use]
     pub fn text(&self) -> String {
+        let headings: Vec<String> = self.parts.iter().map(|(name, _)| format!("// {name}")).collect();
+        let parts = headings.iter().zip(&self.parts);
+        let lines: Vec<&str> =
+            parts.flat_map(|(heading, (_, part))| iter::once(heading.as_str()).chain(part.lines())).collect();
         let mut text = self.constants.clone();
-        for (name, part) in &self.parts {
-            let _ = writeln!(text, "// {name}");
-            for line in part.lines() {
-                let _ = match tensor::expand(line, self.memory) {
-                    Some(expanded) => writeln!(text, "{expanded}"),
-                    None => writeln!(text, "{line}"),
-                };
-            }
+        for line in tensor::expanded(&lines, self.memory) {
+            let _ = writeln!(text, "{line}");
         }
         text
     }
@@ -167,10 +166,13 @@ fn binding_type(module: &naga::Module, variable: &naga::GlobalVariable) -> wgpu:
         }),
         (_, naga::TypeInner::Image { class: naga::ImageClass::Storage { format, access }, .. }) => {
             wgpu::BindingType::StorageTexture {
-                access: if access.contains(naga::StorageAccess::LOAD) {
-                    wgpu::StorageTextureAccess::ReadWrite
-                } else {
-                    wgpu::StorageTextureAccess::WriteOnly
+                access: match (
+                    access.contains(naga::StorageAccess::LOAD),
+                    access.contains(naga::StorageAccess::STORE),
+                ) {
+                    (true, true) => wgpu::StorageTextureAccess::ReadWrite,
+                    (true, false) => wgpu::StorageTextureAccess::ReadOnly,
+                    _ => wgpu::StorageTextureAccess::WriteOnly,
                 },
                 format: texture_format(*format),
                 view_dimension: wgpu::TextureViewDimension::D2,

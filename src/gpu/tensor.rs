@@ -1,8 +1,9 @@
 //! Arrays that live in a storage buffer or, where that is faster, in a texture.
 //!
 //! llvmpipe reads a storage buffer lane by lane, with a bounds check each; texels it gathers. A vec4 from a
-//! texture costs a tenth of one from a buffer there, which is worth a factor of three on a whole step. GPUs
-//! read both equally fast, and buffers can be larger: there every tensor is a buffer.
+//! texture costs a tenth of one from a buffer there, which is worth a factor of three on a whole step; and a storage
+//! texture, which has one size, a third of a sampled one, whose size it looks up by the mipmap level of every lane. GPUs
+//! read all equally fast, and buffers can be larger: there every tensor is a buffer.
 //!
 //! WGSL declares `tensor<read> name: vec4<f32>;` (or `write`, `read_write`; `vec2<f32>`, `vec2<u32>`, `u32`)
 //! and calls `name_load(index)` and `name_store(index, value)`. It is the one extension of the linker.
@@ -10,6 +11,7 @@
 use super::Gpu;
 use anyhow::{Result, ensure};
 use bytemuck::Pod;
+use std::borrow::Cow;
 
 /// Where the tensors of a kernel live.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -87,39 +89,77 @@ impl Element {
     }
 }
 
-/// Expands one declaration; `None` when `line` is none. The expansion is one line, so that positions in error
-/// messages stay true.
-#[must_use]
-pub fn expand(line: &str, memory: TensorMemory) -> Option<String> {
-    let (access, rest) = line.strip_prefix("tensor<")?.split_once("> ")?;
-    let (name, kind) = rest.trim_end().strip_suffix(';')?.split_once(": ")?;
-    let element = Element::ALL.into_iter().find(|element| element.wgsl() == kind)?;
-    let (format, sampled, components, widened) = element.texel();
-    let at = format!("vec2<u32>(index % {WIDTH}u, index / {WIDTH}u)");
-    let (variable, load, store) = match (memory, access) {
-        (TensorMemory::Buffers, _) => {
-            let access = if access == "read" { "read" } else { "read_write" };
-            let variable = format!("var<storage, {access}> {name}: array<{kind}>;");
-            (variable, format!("{name}[index]"), format!("{name}[index] = value;"))
+/// Storage textures of a kernel: as many as WebGPU guarantees. Tensors that are only read can be sampled textures, too.
+const STORAGE_TEXTURES: usize = 4;
+
+/// A declaration of a tensor in WGSL.
+#[derive(Clone, Copy, Debug)]
+struct Declaration<'a> {
+    access: &'a str,
+    name: &'a str,
+    element: Element,
+}
+
+impl<'a> Declaration<'a> {
+    /// What `line` declares, if it declares a tensor.
+    fn of(line: &'a str) -> Option<Self> {
+        let (access, rest) = line.strip_prefix("tensor<")?.split_once("> ")?;
+        let (name, kind) = rest.trim_end().strip_suffix(';')?.split_once(": ")?;
+        let element = Element::ALL.into_iter().find(|element| element.wgsl() == kind)?;
+        Some(Self { access, name, element })
+    }
+
+    fn is_written(&self) -> bool {
+        self.access != "read"
+    }
+
+    /// Its WGSL: one line, so that positions in error messages stay true.
+    fn text(&self, memory: TensorMemory, is_storage: bool) -> String {
+        let Self { access, name, element } = *self;
+        let kind = element.wgsl();
+        let (format, sampled, components, widened) = element.texel();
+        let at = format!("vec2<u32>(index % {WIDTH}u, index / {WIDTH}u)");
+        let (variable, load, store) = match memory {
+            TensorMemory::Buffers => {
+                let access = if self.is_written() { "read_write" } else { "read" };
+                let variable = format!("var<storage, {access}> {name}: array<{kind}>;");
+                (variable, format!("{name}[index]"), format!("{name}[index] = value;"))
+            }
+            TensorMemory::Textures if is_storage => {
+                let variable = format!("var {name}: texture_storage_2d<{format}, {access}>;");
+                let load = format!("textureLoad({name}, {at}){components}");
+                (variable, load, format!("textureStore({name}, {at}, {widened});"))
+            }
+            TensorMemory::Textures => {
+                let load = format!("textureLoad({name}, {at}, 0){components}");
+                (format!("var {name}: texture_2d<{sampled}>;"), load, String::new())
+            }
+        };
+        let mut text = variable;
+        if access != "write" {
+            text += &format!(" fn {name}_load(index: u32) -> {kind} {{ return {load}; }}");
         }
-        (TensorMemory::Textures, "read") => {
-            let load = format!("textureLoad({name}, {at}, 0){components}");
-            (format!("var {name}: texture_2d<{sampled}>;"), load, String::new())
+        if self.is_written() {
+            text += &format!(" fn {name}_store(index: u32, value: {kind}) {{ {store} }}");
         }
-        (TensorMemory::Textures, access) => {
-            let variable = format!("var {name}: texture_storage_2d<{format}, {access}>;");
-            let load = format!("textureLoad({name}, {at}){components}");
-            (variable, load, format!("textureStore({name}, {at}, {widened});"))
-        }
+        text
+    }
+}
+
+/// The lines of a kernel with their declarations of tensors expanded. Those of the last lines, where the entry point is, become
+/// storage textures first.
+pub fn expanded<'a>(lines: &[&'a str], memory: TensorMemory) -> Vec<Cow<'a, str>> {
+    let written = lines.iter().filter_map(|line| Declaration::of(line)).filter(Declaration::is_written);
+    let mut left = STORAGE_TEXTURES.saturating_sub(written.count());
+    let expanded = |line: &&'a str| {
+        let Some(tensor) = Declaration::of(line) else { return Cow::Borrowed(*line) };
+        let is_storage = tensor.is_written() || left > 0;
+        left -= usize::from(is_storage && !tensor.is_written());
+        Cow::Owned(tensor.text(memory, is_storage))
     };
-    let mut text = variable;
-    if access != "write" {
-        text += &format!(" fn {name}_load(index: u32) -> {kind} {{ return {load}; }}");
-    }
-    if access != "read" {
-        text += &format!(" fn {name}_store(index: u32, value: {kind}) {{ {store} }}");
-    }
-    Some(text)
+    let mut text: Vec<_> = lines.iter().rev().map(expanded).collect();
+    text.reverse();
+    text
 }
 
 /// An array on the device.
