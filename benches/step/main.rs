@@ -111,6 +111,7 @@ impl Preset {
             config.merge(&json!({
                 "grid": { "levels": 16, "log2_table": 15 },
                 "network": { "width": 64, "color_layers": 2 },
+                "march": { "steps": 320 },
                 "selection": { "weight_floor": 0 },
                 "batch": { "kept": 1 << 15, "samples": 1 << 17, "rays": 1 << 15 },
             }))?;

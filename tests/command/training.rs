@@ -121,11 +121,14 @@ fn renders_an_orbit_without_its_dataset(run: &Path) {
     quietly(&missing).assert().code(1).stderr(contains("within 0..2"));
 }
 
-/// Without a schedule, so that the end of the first half makes no difference.
+/// A constant learning rate, so that a stop in the middle makes no difference.
+const CONSTANT_RATE: [&str; 4] =
+    ["--set", "optimizer.learning_rate=0.01", "--set", "optimizer.final_learning_rate=0.01"];
+
 #[test]
 fn two_halves_are_a_whole() {
     let (whole, halves) = (place("whole"), place("halves"));
-    let constant = ["--set", "optimizer.final_learning_rate=0.01", "--no-eval", "--steps"];
+    let constant = [&CONSTANT_RATE[..], &["--no-eval", "--steps"]].concat();
     train(&TOYS, &whole, &[&constant[..], &["72"]].concat());
     train(&TOYS, &halves, &[&constant[..], &["40"]].concat());
     train(&TOYS, &halves, &["--no-eval", "--resume", "--steps", "72"]);
@@ -276,8 +279,7 @@ fn deterministic_runs_are_equal_bit_for_bit() {
                     &set,
                 ];
                 let mut command = quietly(&args);
-                // A constant learning rate, so that a stop in the middle makes no difference.
-                command.args(["--set", "optimizer.final_learning_rate=0.01", "--steps", steps]);
+                command.args(CONSTANT_RATE).args(["--steps", steps]);
                 match number {
                     0 => command.args(["--config", SMOKE]),
                     _ => command.arg("--resume"),
