@@ -1,6 +1,6 @@
 // Hash-grid features of each sample, two levels per thread: one pair of levels per row of workgroups, so that their
 // entries stay in the cache.
-// needs: counters, grid, group, rows
+// needs: counters, grid, group
 
 tensor<read> samples: vec4<f32>;
 tensor<read> table: vec2<f32>;
@@ -27,7 +27,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let position = samples_load(index).xyz;
-    let pair = row_spread(id.y, LEVELS / 2u);
+    // A software driver gives each of its threads a run of rows: coarse and fine pairs in both halves, so that they have the
+    // same work.
+    let half = LEVELS / 4u;
+    let pair = 2u * (id.y % half) + id.y / half;
     let low = encode_level(position, levels[2u * pair]);
     let high = encode_level(position, levels[2u * pair + 1u]);
     encoding_store(index * (LEVELS / 2u) + pair, vec4(low, high));

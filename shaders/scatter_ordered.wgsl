@@ -1,7 +1,7 @@
 // The encoding's backward pass without atomics: each thread owns one level and adds the kept samples' gradients in
 // their order, so that nothing collides and every sum is the same in every run. For adapters with few threads, where it
 // is three times as fast as atomics.
-// needs: counters, grid, rows, usable
+// needs: counters, grid, usable
 
 tensor<read> samples: vec4<f32>;
 tensor<read> kept_rows: vec2<u32>;
@@ -16,7 +16,7 @@ fn gradient_add(entry: u32, gradient: vec2<f32>) {
 @compute @workgroup_size(LEVELS / 2u)
 fn main(@builtin(local_invocation_id) lane: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>) {
     // Coarse and fine levels in turn, so that the groups have the same work.
-    let l = row_spread(group.x * (LEVELS / 2u) + lane.x, LEVELS);
+    let l = 2u * lane.x + group.x;
     let level = levels[l];
     let odd = (l & 1u) == 1u;
     let count = select(0u, counters.kept, gradients_usable());

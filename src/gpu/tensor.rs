@@ -89,9 +89,6 @@ impl Element {
     }
 }
 
-/// Storage textures of a kernel: as many as WebGPU guarantees. Tensors that are only read can be sampled textures, too.
-const STORAGE_TEXTURES: usize = 4;
-
 /// A declaration of a tensor in WGSL.
 #[derive(Clone, Copy, Debug)]
 struct Declaration<'a> {
@@ -146,11 +143,12 @@ impl<'a> Declaration<'a> {
     }
 }
 
-/// The lines of a kernel with their declarations of tensors expanded. Those of the last lines, where the entry point is, become
-/// storage textures first.
+/// The lines of a kernel with their declarations of tensors expanded. As many as WebGPU guarantees become storage textures, those
+/// that are written before all, then those of the last lines, where the entry point is; what is only read can be sampled, too.
 pub fn expanded<'a>(lines: &[&'a str], memory: TensorMemory) -> Vec<Cow<'a, str>> {
     let written = lines.iter().filter_map(|line| Declaration::of(line)).filter(Declaration::is_written);
-    let mut left = STORAGE_TEXTURES.saturating_sub(written.count());
+    let most = wgpu::Limits::default().max_storage_textures_per_shader_stage as usize;
+    let mut left = most.saturating_sub(written.count());
     let expanded = |line: &&'a str| {
         let Some(tensor) = Declaration::of(line) else { return Cow::Borrowed(*line) };
         let is_storage = tensor.is_written() || left > 0;
