@@ -1,10 +1,10 @@
 //! Alpha: straight, premultiplied, or in a file of its own.
 
-use super::{DECIDED, PLAIN, SIZE, STEPS, TOYS, all_images, are_equal, copy, remarks, repaint, srgb8, stem};
+use super::{DECIDED, SIZE, STEPS, TOYS, all_images, are_equal, copy, remarks, repaint, srgb8, stem};
 use crate::program::{checkpoint, number, place, train};
 use image::{GrayImage, RgbImage};
 use nerf::photo::AlphaMode;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 /// Toys whose colours are multiplied with alpha.
@@ -22,13 +22,24 @@ static PREMULTIPLIED: LazyLock<PathBuf> = LazyLock::new(|| {
     dataset
 });
 
+/// That of the middle one of three seeds: single runs that differ in the last bit of a few pixels may end 0.8 dB apart.
+fn typical_psnr(dataset: &Path, run: &Path) -> f64 {
+    let trained =
+        |seed| number(&train(dataset, run, &[&STEPS[..], &["--overwrite", "--seed", seed]].concat())["psnr"]);
+    let mut scores = ["0", "1", "2"].map(trained);
+    scores.sort_by(f64::total_cmp);
+    scores[1]
+}
+
 #[test]
 fn premultiplied_photos_train_like_straight_ones() {
-    let (straight, plain) = &*PLAIN;
-    let premultiplied = place("premultiplied_run");
-    let psnr = number(&train(&PREMULTIPLIED, &premultiplied, &STEPS)["psnr"]);
+    let [straight, premultiplied] = ["straight_run", "premultiplied_run"].map(place);
+    let (plain, psnr) = (typical_psnr(&TOYS, &straight), typical_psnr(&PREMULTIPLIED, &premultiplied));
     let reading = |run| checkpoint(run).metadata.reading.alpha;
-    assert_eq!((reading(straight), reading(&premultiplied)), (AlphaMode::Straight, AlphaMode::Premultiplied));
+    assert_eq!(
+        (reading(&straight), reading(&premultiplied)),
+        (AlphaMode::Straight, AlphaMode::Premultiplied)
+    );
     println!("{plain:.2} dB straight, {psnr:.2} dB premultiplied");
     assert!((psnr - plain).abs() < 0.5, "{plain} {psnr}");
 }
